@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from contactopt.analytic import Reference
     from contactopt.bodies.fields import Fields
     from contactopt.coupling.reduction import reduce, reduce_bodies
-    from contactopt.derivatives.design import Design, design
-    from contactopt.derivatives.fit import Fit, fit
     from contactopt.derivatives.gradient import gradient
     from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
@@ -60,8 +58,6 @@ _HOMES = {
     "analytic": "Reference",
     "bodies.fields": "Fields",
     "coupling.reduction": "reduce reduce_bodies",
-    "derivatives.design": "Design design",
-    "derivatives.fit": "Fit fit",
     "derivatives.gradient": "gradient",
     "derivatives.interface": "sensitivity",
     "errors": "BackendError InputError",

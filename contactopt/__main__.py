@@ -17,10 +17,6 @@ def _interrupt(number: int, frame: object) -> None:
 
 def main() -> int:
     """The command line; Ctrl-C while it is still being loaded ends with one line, too."""
-    if any(os.environ.get(name, "1") != "1" for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE")):
-        # Ranks share the cores: one BLAS thread each, set before NumPy is loaded.
-        for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-            os.environ.setdefault(name, "1")
     if signal.getsignal(signal.SIGINT) == signal.default_int_handler:
         signal.signal(signal.SIGINT, _interrupt)
     try:

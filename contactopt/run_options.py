@@ -15,8 +15,8 @@ from dataclasses import dataclass, fields
 from importlib.resources import files
 from typing import Any, NamedTuple, TypeVar
 
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
 
 TOGETHER = "accuracy and quantity belong together: the bound, and the name of what it bounds."
 F = TypeVar("F", bound=Callable[..., Any])
@@ -42,6 +42,7 @@ class RunOptions:
     quantity: str | None = None
     read: tuple[str, ...] = ()
     adaptive: bool = False
+    bound: bool = False
     max_unknowns: int | None = None
     time_limit: float | None = None
     max_memory: float | None = None
@@ -61,9 +62,11 @@ class RunOptions:
             raise InputError(TOGETHER)
         if self.accuracy is None and self.adaptive:
             raise InputError("adaptive refinement needs an aim: give an accuracy and a quantity.")
+        if self.accuracy is None and self.bound:
+            raise InputError("a guaranteed bound ends a search: give an accuracy and a quantity.")
         if self.resume and self.start is not None:
             raise InputError("resume and start exclude each other: give one of them.")
-        if self.accuracy is None and set(self.bounds) - {"time_limit"}:
+        if self.accuracy is None and set(self.limits) - {"time_limit"}:
             raise InputError(
                 "bounds on unknowns and memory end the search for an accuracy: give an"
                 " accuracy and a quantity."
@@ -75,7 +78,7 @@ class RunOptions:
         return self._given("normal", "tangential", "preconditioner")
 
     @property
-    def bounds(self) -> dict[str, Any]:
+    def limits(self) -> dict[str, Any]:
         """Those that end the search for an accuracy."""
         return self._given("max_unknowns", "time_limit", "max_memory")
 

@@ -12,29 +12,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.bodies.ranks import Team, spread
-from contactopt.cards import count
-from contactopt.checks import meant, said_once
+from contactopt.checks import meant, overheard, said_once
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.errors import InputError
-from contactopt.figures.output import PAGE, draw, earlier_files, write
+from contactopt.figures.output import PAGE, draw, earlier_files, not_drawable, write
 from contactopt.figures.style import FORMATS
-from contactopt.files.writing import check_folder, whole_folder
+from contactopt.files.writing import check_folder, finite, whole_folder
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
+from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
-from contactopt.readings.peaks import Reading, pressure_reading
-from contactopt.readings.quantities import approach, quantity_of_states
-from contactopt.readings.resolution import remarks
+from contactopt.readings.chords import chord_remarks
+from contactopt.readings.corners import corner_remarks
+from contactopt.readings.peaks import pressure_reading
+from contactopt.readings.plate_motions import approach
+from contactopt.readings.plausibility import doubts
+from contactopt.readings.quantities import quantity_of_states
+from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
-from contactopt.readings.validity import validity
+from contactopt.readings.validity import check_possible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
 from contactopt.solving import solve_states
-from contactopt.solving.limits import Limits
-from contactopt.solving.progress import resident_memory
+from contactopt.solving.limits import Limits, too_large
 from contactopt.solving.restart import FILE, Restart, make_restart
 from contactopt.solving.solve_scene import Options, Solved
 
@@ -43,7 +45,6 @@ if TYPE_CHECKING:
     from contactopt.scenes.scene_files import SceneFile
 
 Note = Callable[[str], None]
-APART = 0.05  # relative difference of two readings of the largest pressure that is told
 PATH_KEYS = (
     "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
 )  # fmt: skip
@@ -56,24 +57,12 @@ class Result(Outcome):
     __doc__ = Outcome.__doc__
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
-        """Write the result as one page to explore in a browser, and open it.
+        """Write the result as one page to explore in a browser, by default into a temporary file,
+        and open it. InputError if plotly is not installed, which the page takes its drawing program
+        from, or if the file, whose name ends in .html, cannot be written.
 
         The page needs no network and nothing but the browser (contactopt.figures.view_page says
         what is on it).
-
-        Parameters
-        ----------
-        file : where to write the page, ends in .html; None: a temporary file
-        show : whether to open it in the browser
-
-        Returns
-        -------
-        Path : of the page
-
-        Raises
-        ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or
-            if the file cannot be written
         """
         import tempfile
         import webbrowser
@@ -97,7 +86,6 @@ def run(
     out: str | Path | None = None,
     *,
     note: Note = lambda text: None,
-    team: Team | None = None,
     **changes: Any,
 ) -> Result:
     """Solve a scene end to end, and write its figures and files into a folder if one is given.
@@ -108,8 +96,6 @@ def run(
         scene file, whose name ends in .toml; or a Scene
     out : folder for the files; None: nothing is written
     note : receives progress messages
-    team : ranks among which the bodies are dealt out (contactopt.bodies.ranks); None: all bodies
-        live in this process
     OPTIONS
     changes : to the arguments of a named scene, such as `elements`, or to the fields of a Scene
 
@@ -125,6 +111,18 @@ def run(
     ------
     InputError : with a sentence that says what to do; nothing is left half-written
     """
+    with overheard() as told, collected() as noted:
+        return _run(scene, out, note, changes, lambda: (*told, *noted))
+
+
+def _run(
+    scene: str | Path | Scene,
+    out: str | Path | None,
+    note: Note,
+    changes: dict[str, Any],
+    told: Callable[[], tuple[str, ...]],
+) -> Result:
+    """As run(); `told` gives the remarks that were made so far outside of the solution."""
     start = time.perf_counter()
     file = _scene_file(scene, changes)
     options, changes = choose(changes, {} if file is None else file.solve)
@@ -136,28 +134,28 @@ def run(
     for quantity in options.read:
         quantity_of_states(quantity, states)
     restart = make_restart(out, options.resume, options.start, len(states) > 1, note)
-    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.bounds.items()})
+    limits = Limits(**{BOUNDS[bound]: value for bound, value in options.limits.items()})
     how = _how(options, method, start, restart, note)
     prepared = time.perf_counter() - start
     try:
         solved, estimate = None, None
         if options.simplest:
             states, solved = _simplest(states, how)
-        if team is not None:
-            states = _dealt(states, team, note)
-        if solved is None or team is not None or options.accuracy is not None:
+        if solved is None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
-        result = _result(solved, estimate, (name, *method.backends(states[-1].dim)))
+        names = (name, *method.backends(states[-1].dim))
+        result = _result(solved, estimate, names, told())
         if options.read:
             from contactopt.accuracy.indicators import read_once  # with the room of derivatives
 
             with _clock(result.summary["seconds"], "quantities"):
-                result.summary["quantities"] = {one: read_once(solved, one) for one in options.read}
+                found = {one: read_once(solved, one) for one in options.read}
+                result.summary["quantities"] = finite(found)
         result.summary["seconds"] = {"scene": prepared} | result.summary["seconds"]
         return _written(result, out, options, start, note, restart)
     except MemoryError as error:
         restart.stopped(note)
-        raise InputError(_too_large(states[-1], str(error))) from error
+        raise InputError(too_large(states[-1], str(error))) from error
     except KeyboardInterrupt:
         restart.stopped(note)
         raise
@@ -249,14 +247,6 @@ def _simplest(states: tuple[Scene, ...], how: Options) -> tuple[tuple[Scene, ...
     return (found.scene,), solved
 
 
-def _dealt(states: tuple[Scene, ...], team: Team, note: Note) -> tuple[Scene, ...]:
-    """The states with their elastic bodies on the ranks of a team."""
-    idle = team.size - sum(part.meshed for part in states[-1].parts)
-    if idle > 0:
-        note(f"{idle} of {team.size} ranks have nothing to do: there are no more elastic bodies")
-    return tuple(spread(state, team) for state in states)
-
-
 @said_once()
 def _solved(
     states: tuple[Scene, ...], options: RunOptions, limits: Limits, how: Options
@@ -266,27 +256,38 @@ def _solved(
         return solve_states(states, options=how), None
     from contactopt.accuracy.loop import refine  # it brings the room of derivatives with it
 
-    return refine(states, options.quantity, options.accuracy, how, limits, options.adaptive)
-
-
-def _too_large(scene: Scene, why: str) -> str:
-    """The sentence for a run that took all the memory there was."""
-    bodies = count(len(scene.parts), "body", "bodies")
-    held = f"{resident_memory() / 1e9:.2g} GB were taken when more was asked for"
-    return (
-        f"scene '{scene.name}' of {bodies} with elements = {scene.elements} needs more memory than"
-        f" there is: {held}{f' ({why})' if why else ''}; take fewer elements."
+    return refine(
+        states,
+        options.quantity,
+        options.accuracy,
+        how,
+        limits,
+        adaptive=options.adaptive,
+        bound=options.bound,
     )
 
 
-def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, str]) -> Result:
-    """The result with the fields of the bodies; `names` are of the method and its backends."""
+def _result(
+    solved: Solved,
+    estimate: Estimate | None,
+    names: tuple[str, str, str],
+    told: tuple[str, ...] = (),
+) -> Result:
+    """The result with the fields of the bodies; `names` are of the method and its backends, and
+    `told` are remarks made before.
+    """
     reduction, solution = solved.reduction, solved.solution
     seconds = dict(solution.seconds)
     with _clock(seconds, "recover"):
         fields = recover(reduction, solution)
     with _clock(seconds, "readings"):
         summary = _summary(solved, names)
+        if estimate is None:  # which knows the curves, and refines the chords
+            summary["remarks"] += chord_remarks(reduction, solution)
+            summary["remarks"] += corner_remarks(reduction, solution)
+    noted = [solution] if solved.path is None else solved.path.solutions
+    every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
+    summary["remarks"] = list(dict.fromkeys(every))
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
@@ -294,7 +295,7 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
         summary |= {key: float(solved.path.history[key][-1]) for key in keys}
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
-    summary["seconds"] = seconds
+    summary = finite(summary) | {"seconds": seconds}
     return Result(
         reduction.scene, reduction, solution, fields, solved.zones, summary, solved.path, estimate
     )
@@ -303,17 +304,22 @@ def _result(solved: Solved, estimate: Estimate | None, names: tuple[str, str, st
 def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     """What is known of the answer on one mesh at one state."""
     reduction, solution = solved.reduction, solved.solution
-    problem = reduction.problem
+    problem, scene = reduction.problem, reduction.scene
     found = tables(reduction, solution)
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
+    more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    said = [*remarks(reduction, solution), *beyond]
+    if solution.solved and solved.path is None:  # the states of a path before are kept
+        check_possible(limits, reduction.couplings)
+    known = doubts(scene, reduction.couplings)
+    said = [*known, *remarks(reduction, solution), *beyond]
     return {
-        "scene": reduction.scene.name,
-        "kind": reduction.scene.kind,
-        "units": list(reduction.scene.units),
+        "scene": scene.name,
+        "kind": scene.kind,
+        "units": list(scene.units),
+        "thickness": None if scene.dim == 3 or scene.analysis.revolved else scene.thickness,
         "mirrors": mirrors(reduction),
         "dofs": reduction.dofs,
         "contact_nodes": problem.contacts,
@@ -324,27 +330,16 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
         "normal_force": float(solution.reactions[:, 0].sum()),
-        "approach": approach(problem, solution),
+        "approach": approach(reduction, solution),
         **{key: first[key] if single else None for key in WIDTHS},
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": said if peak is None else [*said, *_smoothed(peak, largest)],
+        "remarks": [*said, *more],
         **found,
         "limits": limits,
     }
-
-
-def _smoothed(peak: Reading, largest: float) -> list[str]:
-    """One sentence where the largest pressure at a node is not the one that is read around it."""
-    if abs(largest - peak.value) <= APART * abs(largest):
-        return []
-    return [
-        f"the largest pressure at a node is {largest:.4g}, what its"
-        f" neighbours let expect is {peak.value:.4g}, give or take"
-        f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
-    ]
 
 
 def _written(
@@ -360,6 +355,9 @@ def _written(
     if out is None:
         seconds["total"] = time.perf_counter() - start
         return result
+    if (options.figures or options.html) and (beyond := not_drawable(result)):
+        options = replace(options, figures=(), html=False)
+        result.summary["remarks"].append(beyond)
     note("drawing figures, writing files" if options.figures else "writing files")
     with whole_folder(out, earlier_files(Path(out))) as folder:
         if options.figures:
@@ -367,8 +365,8 @@ def _written(
                 draw(result, folder, options.figures)
         with _clock(seconds, "files"):
             write(result, folder)
-            if result.path is None:
-                restart.finished(result.solution)
+            found = [result.solution] if result.path is None else result.path.solutions
+            restart.ended(result.reduction, found)
             restart.save(folder / FILE, result.solution.solved)
         seconds["total"] = time.perf_counter() - start
         (folder / "summary.json").write_text(json.dumps(result.summary, indent=2) + "\n")

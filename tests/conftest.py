@@ -1,13 +1,52 @@
 """Small problems that several test files share."""
 
+import re
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 from skfem import MeshQuad
 
 from contactopt import InterfaceProblem, Material, Part, Plate, Scene, Support, reduce, scenes
 from contactopt.meshes.structured import rename, tensor_mesh
+from tests.without import optional_packages
 
 MATERIAL = Material(5.0, 0.3)
+EXTRAS = optional_packages()
+OPTIONAL = {name for group in EXTRAS.values() for name in group}
+
+
+def _missing(error: BaseException) -> str | None:
+    """The optional package whose absence an error tells, in Python's words or by our advice."""
+    said = str(error)
+    names = set(re.findall(r"No module named '(\w+)", said))
+    if "pip install" in said:
+        names |= set(re.findall(r"\w+", said))
+        names |= {name for extra in names & set(EXTRAS) for name in EXTRAS[extra]}
+    absent = sorted(name for name in names & OPTIONAL if find_spec(name) is None)
+    return absent[0] if absent else _missing(error.__cause__) if error.__cause__ else None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item):
+    return (yield from _skipping())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    return (yield from _skipping())
+
+
+def _skipping():
+    """Skip a test that needs an optional package which is not there. Packages that the project
+    requires are not among these: without them tests fail. `python -m tests.without` shows it.
+    """
+    try:
+        return (yield)
+    except Exception as error:
+        if missing := _missing(error):
+            pytest.skip(f"needs {missing}")
+        raise
 
 
 def one_contact(force: tuple[float, float], mu: float) -> InterfaceProblem:

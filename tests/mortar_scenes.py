@@ -10,7 +10,7 @@ import numpy as np
 import skfem
 
 from contactopt import InterfaceProblem, Material, Part, Scene, Support, reduce_bodies
-from contactopt.bodies.elements import face_nodes
+from contactopt.bodies.elements import mean_normals, nodes_on
 from contactopt.coupling.coupling import COUPLINGS, Coupling
 from contactopt.coupling.faces import faces_of
 from contactopt.coupling.mortar import Mortar, mortar
@@ -64,7 +64,7 @@ def couple(
     parts, sides = (scene.upper, scene.lower), []
     for b, p in zip((r.body for r in reduction.bodies), parts):
         facets = b.basis.mesh.boundaries[p.contact]
-        faces = face_nodes(b.basis, b.degree, facets)
+        faces = (f(b.basis, b.degree, facets) for f in (nodes_on, mean_normals))
         sides.append(
             faces_of(
                 b.name,

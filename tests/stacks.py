@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 
 from contactopt import BodyForce, Contact, Material, Part, Rigid, Scene
@@ -50,3 +53,31 @@ def stack(
         contacts.append(Contact(f"block{i}", f"block{i - 1}:top" if i else "floor", mu))
     chosen = bodies if order is None else [bodies[i] for i in order]
     return Scene("stack", bodies=tuple(chosen), contacts=tuple(contacts), kind=kind, **more)
+
+
+def layered(scene, count):
+    """A flat punch whose foundation is cut into `count` layers, tied to each other."""
+    whole = scene.lower.build_mesh(scene.elements, scene.zone)
+    up = whole.dim() - 1
+    at = whole.p[up, whole.t].mean(axis=0)
+    planes = np.unique(whole.p[up].round(9))
+    ends = planes[np.linspace(0, len(planes) - 1, count + 1).round().astype(int)]
+    layers, pairs = [], [Contact("punch", f"layer {count}:contact", scene.pairs[0].mu)]
+    for i, (low, high) in enumerate(pairwise(ends), 1):
+        mesh = whole.restrict(np.flatnonzero((at > low) & (at < high)))
+        mesh = mesh.with_boundaries(
+            {
+                f"side {side}": lambda x, end=end: np.abs(x[up] - end) < 1e-6
+                for side, end in (("low", low), ("high", high))
+            }
+        )
+        held = tuple(own for own in scene.lower.supports if len(mesh.boundaries[own.boundary]))
+        face = "contact" if i == count else "side high"
+        layers.append(
+            replace(scene.lower, name=f"layer {i}", mesh=mesh, supports=held, contact=face)
+        )
+        if i > 1:
+            tied = Contact(f"layer {i}:side low", f"layer {i - 1}:side high", 0.0, "tied")
+            pairs.append(replace(tied, coupling="matching"))
+    bodies = {"bodies": (scene.upper, *layers), "contacts": tuple(pairs)}
+    return replace(scene, upper=None, lower=None, mu=None, law="coulomb", **bodies)

@@ -282,6 +282,16 @@ def test_tables_of_one_pair_are_those_of_the_whole():
         (lambda s: replace(s, bodies=(*s.bodies, s.bodies[1])), "two bodies are named 'block0'"),
         (lambda s: replace(s, contacts=s.contacts[:1]), "body 'block1' belongs to no contact"),
         (lambda s: replace(s, contacts=(*s.contacts, s.contacts[0])), "given twice"),
+        (
+            lambda s: replace(s, contacts=(*s.contacts, Contact("block0:top", "block1", 0.1))),
+            "'block1-block0.top' and 'block0.top-block1' join the same two surfaces",
+        ),
+        (
+            lambda s: replace(
+                s, contacts=(*s.contacts, Contact("block1:bottom", "block0:top", 0.0, law="tied"))
+            ),
+            "join the same two surfaces.*keep one of them",
+        ),
         (lambda s: replace(s, contacts=()), "belong together"),
         (lambda s: replace(s, mu=0.3), "not both"),
         (lambda s: Contact("a", "a:top", 0.1), "'a' cannot touch itself"),
@@ -297,6 +307,45 @@ def test_tables_of_one_pair_are_those_of_the_whole():
 def test_wrong_input_is_refused(change, message):
     with pytest.raises(InputError, match=message):
         change(stack(2))
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_pairs_that_share_facets_are_refused(dim, rigid):
+    """Other names for the same facets, or for some of them, would share one force as well. Pairs of
+    boundaries that only meet at nodes are two pairs.
+    """
+    scene = stack(2, dim)
+
+    def also(low, high):
+        def named(part):
+            inside = lambda x: (x[0] > low) & (x[0] < high)  # noqa: E731
+            mesh = part.mesh
+            middle = mesh.p[:, mesh.facets].mean(axis=1)
+            more = {}
+            for name, other in (("bottom", "half"), ("top", "half_top")):
+                facets = mesh.boundaries[name]
+                more[other] = facets[inside(middle[:, facets])]
+            for name in ("bottom", "top"):
+                facets = mesh.boundaries[name]
+                more[f"left_{name}"] = facets[middle[0, facets] < 0.5]
+            return replace(part, mesh=mesh.with_boundaries(more))
+
+        parts = tuple(part if isinstance(part, Rigid) else named(part) for part in scene.bodies)
+        if rigid:
+            pairs = Contact("block0:left_bottom", "floor", 0.5), Contact("block0:half", "floor", 0)
+        else:
+            pairs = (
+                scene.contacts[0],
+                Contact("block1:left_bottom", "block0:left_top", 0.5),
+                Contact("block0:half_top", "block1:half", 0.5),
+            )
+        kept = parts[:2] if rigid else parts
+        return replace(scene, bodies=kept, contacts=pairs)
+
+    with pytest.raises(InputError, match=r"share facets of both bodies near .*keep each facet"):
+        reduce_bodies(also(0.3, 1.0))
+    assert reduce_bodies(also(0.5, 1.0)).problem.contacts > 4
 
 
 def test_surfaces_that_are_not_there_are_refused():

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -100,8 +101,15 @@ def bench(path: Path, out: Path, *more: str, jobs: int = 2) -> list[str]:
     return [*command, "--jobs", str(jobs), *more]
 
 
-def test_every_run_is_a_row_with_every_column(tmp_path):
-    table = run(tmp_path, SMALL)
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    """The folder of a small campaign, and its table."""
+    folder = tmp_path_factory.mktemp("small")
+    return folder, run(folder, SMALL)
+
+
+def test_every_run_is_a_row_with_every_column(campaign):
+    _, table = campaign
     assert len(table) == 3 * 2 * 2 and table["key"].is_unique
     assert list(table.columns[: len(COLUMNS)]) == list(COLUMNS)
     assert set(table["status"]) == {"solved"} and table["success"].all()
@@ -122,9 +130,9 @@ def test_every_run_is_a_row_with_every_column(tmp_path):
     )
 
 
-def test_tables_survive_parquet_and_csv(tmp_path):
-    table = run(tmp_path, SMALL)
-    folder = tmp_path / "out"
+def test_tables_survive_parquet_and_csv(campaign, tmp_path):
+    folder, table = campaign
+    folder = shutil.copytree(folder / "out", tmp_path / "out")
     for name in ("rows.parquet", "rows.csv"):
         if name == "rows.csv":
             benchmark.save(table, folder / name)
@@ -136,6 +144,7 @@ def test_tables_survive_parquet_and_csv(tmp_path):
         assert again["success"].tolist() == table["success"].tolist()
 
 
+@pytest.mark.slow
 def test_fakes_become_honest_rows(tmp_path):
     written(tmp_path, FAKES, "fakes.py")
     names = ["segfaults", "hangs", "nan", "lies", "hoards", "raises", "aborts", "honest"]
@@ -174,6 +183,7 @@ def test_fakes_become_honest_rows(tmp_path):
     assert np.isinf(row["nan"]["residual"]) and 4.0 < row["hangs"]["call_seconds"] < PATIENCE
 
 
+@pytest.mark.slow
 def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
     """Five SIGKILLs of the whole process group at random moments, then an uninterrupted end."""
     text = SMALL.replace("repeats = 2", "repeats = 30")
@@ -205,6 +215,7 @@ def test_killed_campaigns_lose_and_repeat_nothing(tmp_path):
     assert len(benchmark.load(out)) == len(expected)
 
 
+@pytest.mark.slow
 def test_an_interrupted_campaign_keeps_its_rows(tmp_path):
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 500")), tmp_path / "out"
     command = bench(path, out, jobs=1)
@@ -228,6 +239,7 @@ def count(out: Path) -> int:
     return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
+@pytest.mark.slow
 def test_workers_die_with_their_campaign(tmp_path):
     written(tmp_path, FAKES, "fakes.py")
     path = written(
@@ -266,8 +278,8 @@ def test_a_campaign_needs_resume_to_go_on_and_one_writer(tmp_path):
 
 
 def test_missing_packages_are_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(store, "find_spec", lambda name: None if name == "tqdm" else name)
-    with pytest.raises(InputError, match=r"need tqdm; .*contactopt\[benchmark\]"):
+    monkeypatch.setattr(store, "find_spec", lambda name: None if name == "psutil" else name)
+    with pytest.raises(InputError, match=r"need psutil; .*contactopt\[benchmark\]"):
         benchmark.run_campaign(written(tmp_path, SMALL), tmp_path / "out")
 
 
@@ -353,6 +365,7 @@ def fixed_point(problem, tol=1e-8, steps=20000):
     assert (theirs["solve_seconds"] == theirs["call_seconds"]).all()
 
 
+@pytest.mark.slow
 def test_classes_problems_and_their_settings(tmp_path):
     written(
         tmp_path,
@@ -408,6 +421,7 @@ def test_entry_points(tmp_path, monkeypatch):
     assert len(table) == 6 and set(table["status"]) == {"solved"}
 
 
+@pytest.mark.slow
 def test_optional_problems_and_methods_are_left_out_where_they_are_missing(tmp_path, monkeypatch):
     from contactopt import fclib
 
@@ -433,6 +447,7 @@ def test_optional_problems_and_methods_are_left_out_where_they_are_missing(tmp_p
     assert str(tmp_path) not in (tmp_path / "out" / "rows.jsonl").read_text()
 
 
+@pytest.mark.slow
 def test_problems_that_cannot_be_built_are_rows(tmp_path):
     written(
         tmp_path,
@@ -461,6 +476,7 @@ def deadly():
     assert rows["message"].str.contains("no such thing|SIGABRT").all()
 
 
+@pytest.mark.slow
 def test_a_worker_stays_with_its_problem():
     experiment = [
         Task(
@@ -525,6 +541,7 @@ def test_materials_of_scenes_by_name():
         problems.scene("punch-2d", lower_E=2.0, stiffness_ratio=10.0)
 
 
+@pytest.mark.slow
 def test_a_run_past_its_time_limit_is_no_success(tmp_path, monkeypatch):
     monkeypatch.setattr(pool, "GRACE", float(PATIENCE))
     written(
@@ -545,6 +562,7 @@ def test_a_run_past_its_time_limit_is_no_success(tmp_path, monkeypatch):
     )
 
 
+@pytest.mark.slow
 def test_threads_are_pinned(tmp_path):
     written(
         tmp_path,
@@ -560,6 +578,7 @@ def test_threads_are_pinned(tmp_path):
     assert table["message"].str.endswith("11").all()
 
 
+@pytest.mark.slow
 def test_a_worker_process_outlives_failures_that_leave_it_intact(tmp_path):
     with Worker() as worker:
         spec = problems.ProblemSpec("family", "rigid_bodies", {"bodies": 3, "contacts": 4})

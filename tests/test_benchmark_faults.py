@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import psutil
 import pytest
 
 from contactopt import InputError, benchmark, solve
@@ -90,6 +89,7 @@ def test_a_report_named_dots_removes_and_writes_nothing(tmp_path, monkeypatch, c
 STRANGE = ["<b>bold", "x | y", "$\\frac{$ and $a$", "[a](", "`", "a\nb"]
 
 
+@pytest.mark.slow
 def test_strange_texts_are_shown_as_they_are(tmp_path):
     """The same texts as title, text, captions, finding and names of solvers and problems, in tables
     and figures.
@@ -205,6 +205,7 @@ ENDS = {
 }
 
 
+@pytest.mark.slow
 def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monkeypatch):
     """Between them stand honest runs, which must be certified whatever the plug-in before did to
     their process.
@@ -243,6 +244,7 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
     assert max(largest) < 1e9, "what a solver prints is thrown away beyond a bound"
 
 
+@pytest.mark.slow
 def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
     """The first run of the method also costs its warm-up; those that follow cost their limit and a
     start.
@@ -273,6 +275,7 @@ def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_nothing_that_a_solver_started_outlives_the_campaign(tmp_path):
     """A child in a session of its own, and its child, whose parent is gone."""
     source = """
@@ -299,11 +302,14 @@ def leaves_children(problem):
 
 def lives(number: int) -> bool:
     """Whether a process is there and not a dead one that nobody has asked for yet."""
+    import psutil
+
     with contextlib.suppress(psutil.NoSuchProcess):
         return psutil.Process(number).status() != psutil.STATUS_ZOMBIE
     return False
 
 
+@pytest.mark.slow
 def test_problems_of_plugins_are_checked(tmp_path):
     written(
         tmp_path,
@@ -423,6 +429,7 @@ def ended(path: Path, out: Path, *more: str, **settings) -> subprocess.Completed
     return subprocess.run(bench(path, out, *more), capture_output=True, text=True, **settings)
 
 
+@pytest.mark.slow
 def test_malformed_rows_are_made_again(tmp_path):
     path, out = written(tmp_path, SMALL), tmp_path / "out"
     good = run(tmp_path, SMALL)
@@ -439,6 +446,7 @@ def test_malformed_rows_are_made_again(tmp_path):
     one_line(result.stderr, "newer version")
 
 
+@pytest.mark.slow
 def test_answers_of_another_size_are_not_compared(tmp_path):
     run(tmp_path, SMALL, filters=["problem=rigid*"])
     path = tmp_path / "out" / "rows.jsonl"
@@ -452,6 +460,7 @@ def test_answers_of_another_size_are_not_compared(tmp_path):
         benchmark.load(path)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_sentence_and_loses_nothing(tmp_path):
     """No file may grow beyond a size that ends within the rows; with room again the campaign goes
     on.
@@ -487,6 +496,7 @@ def test_folders_that_cannot_be_written(tmp_path, capsys):
 # Kills
 
 
+@pytest.mark.slow
 def test_killed_processes_cost_their_own_run_only(tmp_path):
     """SIGKILL to the processes that run methods, then to the whole campaign, at random moments."""
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 30")), tmp_path / "out"
@@ -532,6 +542,7 @@ def grow(size: int) -> int:
     return os.getpid()
 
 
+@pytest.mark.slow
 def test_a_process_that_grows_goes_on():
     """The library of processes would recycle one that grew by 300 MB in more than a second, and a
     call at that moment was told as a crash, or waited for ever.
@@ -578,6 +589,7 @@ def deadly_pipes():
     signal.signal(signal.SIGPIPE, before)
 
 
+@pytest.mark.slow
 def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch, deadly_pipes):
     """A builder that dies between two problems costs no run, and one that is killed once while it
     builds costs none either.
@@ -600,6 +612,7 @@ def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch, dea
         assert worker.run(Task(run, "x", (), 5.0, 4.0, 100, 0))["success"] and not deaths
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kills", [2, 3])
 def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
     """Twice may be chance; a process that never lives to say a word ends the campaign with one
@@ -630,6 +643,8 @@ def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
 
 def solvers(campaign: int) -> list[int]:
     """The worker processes of a campaign."""
+    import psutil
+
     with contextlib.suppress(psutil.Error):
         return [
             own.pid
@@ -639,6 +654,7 @@ def solvers(campaign: int) -> list[int]:
     return []
 
 
+@pytest.mark.slow
 def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
     """Nothing is left in the module: not by a second registry, and not by a file that is imported
     in a plain way.

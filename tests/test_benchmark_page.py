@@ -3,7 +3,6 @@
 import re
 import shutil
 
-import pandas as pd
 import pytest
 from browser import CHROMIUM, Browser
 
@@ -13,6 +12,8 @@ from contactopt.benchmark.store import load, save
 from contactopt.cli import main
 from tests.test_benchmark import SMALL, written
 from tests.test_page import data_of
+
+pd = pytest.importorskip("pandas")
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +104,7 @@ def test_every_reason_of_refusal_is_said_once_with_its_number():
     assert refusals(table) == [f"2 runs were refused: {missing}", "1 run was refused: no"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_a_browser_sorts_and_filters_the_runs_and_follows_links(campaign):
     with Browser(campaign / "report.html", 400) as browser:

@@ -6,7 +6,6 @@ from itertools import combinations, pairwise
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib.text import Text
 
@@ -19,6 +18,8 @@ from contactopt.benchmark.report_figures import fitted_exponent
 from contactopt.benchmark.store import COLUMNS
 from contactopt.cli import main
 from tests.test_benchmark import SMALL, written
+
+pd = pytest.importorskip("pandas")
 
 CAMPAIGNS = Path(__file__).parents[1] / "experiments" / "campaigns"
 REPORTS = Path(__file__).parents[1] / "reports"
@@ -271,6 +272,7 @@ def test_errors_of_a_report_name_the_figure(reported, monkeypatch, capsys, old, 
     assert words in error and "small.toml" in error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda p: p.stem)
 def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch):
     """Every experiment can be read in both versions, and its report says what its table says.

@@ -1,6 +1,5 @@
-"""What every body offers, whatever it is made of and wherever it is."""
+"""What every body offers, whatever it is made of."""
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -8,43 +7,12 @@ import pytest
 import scipy.linalg as la
 
 from contactopt import reduce, scenes
-from contactopt.bodies import ranks
 from contactopt.bodies.fields import Fields, Region, Validity
-from contactopt.bodies.protocol import Body
-from contactopt.bodies.remote import RemoteBody
 from contactopt.bodies.solvers import SOLVERS
 from contactopt.bodies.solvers.system import BodySolver
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.scenes.scene import Rigid
-from contactopt.scenes.slices import sliced
-
-
-class Here(ranks.Team):
-    """Ranks that are this process: orders and replies travel as bytes, but not far."""
-
-    size = 2
-
-    def __init__(self):
-        self.kept = {}
-
-    def start(self, rank, function, *arguments):
-        reply = pickle.dumps(self._done(function, arguments))
-
-        def end():
-            answer = pickle.loads(reply)
-            if isinstance(answer, ranks.Raised):
-                raise answer.error
-            return answer
-
-        return end
-
-    def keep(self, rank, function, *arguments):
-        made = ranks.Kept(rank, len(self.kept))
-        self.kept[made.number] = self._done(function, arguments)
-        return made
-
-    def _done(self, function, arguments):
-        return ranks._result(self.kept, *pickle.loads(pickle.dumps((function, arguments))))
+from tests.stacks import layered
 
 
 class Dense(BodySolver):
@@ -68,8 +36,7 @@ SCENES = {
     "finite elements": punch,
     "solid": lambda: scenes.flat_punch(3, elements=2),
     "rigid and half-space": lambda: scenes.hertz_half_space(elements=4),
-    "sliced": lambda: sliced(punch(), "foundation", 2),
-    "remote": lambda: ranks.spread(punch(), Here()),
+    "tied layers": lambda: layered(punch(), 2),
     "rigid": lambda: replace(punch(), upper=Rigid("punch", force={"y": -1.0})),
 }
 
@@ -142,25 +109,8 @@ def test_readings_of_a_body_are_of_its_kind(sides, reduction):
         assert body.grounded(1.0) is body and body.pulled(U) is body
 
 
-def test_a_body_elsewhere_has_every_member_of_a_body():
-    members = [name for name, member in vars(Body).items() if callable(member) and name[0] != "_"]
-    assert len(members) > 20 and not set(members) - set(vars(RemoteBody))
-
-
-@pytest.mark.parametrize("options", [{}, {"solver": "dense"}], ids=["auto", "dense"])
-def test_the_problem_is_the_same_wherever_its_bodies_are(options, monkeypatch):
+def test_the_least_solver_gives_the_same_problem(monkeypatch):
     monkeypatch.setitem(SOLVERS, "dense", (__name__, "Dense", "dense factors"))
-    here, there = (reduce(scene, **options) for scene in (punch(), SCENES["remote"]()))
-    assert np.allclose(here.Q, there.Q, rtol=0, atol=1e-14 * np.abs(here.Q).max())
-    assert np.allclose(here.q, there.q, rtol=0, atol=1e-12)
-
-
-def test_a_solver_of_rank_0_is_known_on_every_rank(monkeypatch):
-    """A rank is told the row of the table that rank 0 has, and may not have itself."""
-    scene = SCENES["remote"]()
-    monkeypatch.setitem(SOLVERS, "dense", (__name__, "Dense", "dense factors"))
-    order = []
-    keep = Here.keep
-    monkeypatch.setattr(Here, "keep", lambda *made: order.append(made) or keep(*made))
-    reduce(scene, solver="dense")
-    assert any((__name__, "Dense", "dense factors") in made for made in order)
+    usual, least = (reduce(punch(), **options) for options in ({}, {"solver": "dense"}))
+    assert np.allclose(usual.Q, least.Q, rtol=0, atol=1e-14 * np.abs(usual.Q).max())
+    assert np.allclose(usual.q, least.q, rtol=0, atol=1e-12)

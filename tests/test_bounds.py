@@ -8,21 +8,22 @@ import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, Support
-from contactopt.accuracy.bound import Bound, bounded
-from contactopt.accuracy.displaced_stress import halved
-from contactopt.accuracy.equilibrated import Simplices
-from contactopt.accuracy.equilibrium_elements import EquilibriumElements
-from contactopt.accuracy.facing_facets import facet_rule, measures
-from contactopt.accuracy.interval import interval
 from contactopt.accuracy.loop import refine
-from contactopt.accuracy.nearest_tractions import Answer, BalancedMoments
-from contactopt.accuracy.uneven_traction import (
+from contactopt.bounds import bounded
+from contactopt.bounds.bound import Bound
+from contactopt.bounds.displaced_stress import halved
+from contactopt.bounds.equilibrium_elements import EquilibriumElements
+from contactopt.bounds.facing_facets import facet_rule, measures
+from contactopt.bounds.interval import interval
+from contactopt.bounds.nearest_tractions import Answer, BalancedMoments
+from contactopt.bounds.tetrahedra import Tetrahedra
+from contactopt.bounds.uneven_traction import (
     CONSTANT,
     least_energy,
-    regular_simplex,
+    regular_tetrahedron,
     uneven_squares,
 )
-from contactopt.accuracy.vertex_balance import Balance
+from contactopt.bounds.vertex_balance import Balance
 from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
@@ -168,7 +169,7 @@ def test_tractions_in_space_become_those_of_elements_in_balance():
     cube = skfem.MeshTet.init_tensor(*[np.linspace(0, 1, 4)] * 3)
     inner = np.all((cube.p > 1e-9) & (cube.p < 1 - 1e-9), axis=0)
     p = cube.p + 0.05 * inner * random.standard_normal(cube.p.shape)
-    cells = Simplices(skfem.MeshTet(p, cube.t))
+    cells = Tetrahedra(skfem.MeshTet(p, cube.t))
     known = np.zeros((cube.facets.shape[1], 3), dtype=bool)
     balance = Balance(cells.forces_of_moments, known)
     space = BalancedMoments(cells, MATERIAL, balance, Answer(1, clamped(cells.mesh)))
@@ -188,30 +189,28 @@ def on_elements(cells, m):
     return own.sum(axis=(0, 1)), np.cross(x, own).sum(axis=(0, 1))
 
 
-@pytest.mark.parametrize("mesh", [skfem.MeshTri().refined(2), skfem.MeshTet().refined(1)])
-def test_a_linear_stress_is_its_own_equilibrated_stress(mesh):
+def test_a_linear_stress_is_its_own_equilibrated_stress():
     """With random facets, loads and a stress that balances them exactly, s* = s."""
-    d, random = len(mesh.p), np.random.default_rng(0)
+    mesh, d, random = skfem.MeshTet().refined(1), 3, np.random.default_rng(0)
     p = mesh.p.copy()
     inner = np.all((p > 1e-9) & (p < 1 - 1e-9), axis=0)
     p[:, inner] += 0.05 * random.standard_normal(p[:, inner].shape)
-    cells = Simplices(type(mesh)(p, mesh.t))
+    cells = Tetrahedra(type(mesh)(p, mesh.t))
     slopes = random.standard_normal((d, d, d))
     slopes += slopes.swapaxes(0, 1)
     stress = np.einsum("ijk,kae->eaij", slopes, cells.mesh.p[:, cells.mesh.t])
     held = np.zeros((mesh.facets.shape[1], d), dtype=bool)
     held[cells.mesh.f2t[1] < 0] = True
     load, none = -np.einsum("ijj->i", slopes), np.zeros((*held.shape, d))
-    answer = Answer(1, clamped(cells.mesh)) if d == 3 else None
+    answer = Answer(1, clamped(cells.mesh))
     made, unbalanced = cells.equilibrated(MATERIAL, stress, load, held, none, answer)
     assert np.allclose(made, cells.data_of(stress), atol=1e-12) and unbalanced < 1e-12
     data = cells.data_of(stress)
     E, nu = MATERIAL.E, MATERIAL.nu
     trace = np.trace(stress, axis1=2, axis2=3)
-    factor = nu * (1 + nu) if d == 2 else nu
-    points = ((1 + nu) * np.sum(stress**2, axis=(2, 3)) - factor * trace**2) / E
+    points = ((1 + nu) * np.sum(stress**2, axis=(2, 3)) - nu * trace**2) / E
     mean, own = stress.mean(axis=1), np.trace(stress.mean(axis=1), axis1=1, axis2=2)
-    middle = ((1 + nu) * np.sum(mean**2, axis=(1, 2)) - factor * own**2) / E
+    middle = ((1 + nu) * np.sum(mean**2, axis=(1, 2)) - nu * own**2) / E
     exact = cells.volume * (points.sum(axis=1) + (d + 1) ** 2 * middle) / ((d + 1) * (d + 2))
     assert np.allclose(cells.products(MATERIAL, data, data), exact)
 
@@ -219,14 +218,16 @@ def test_a_linear_stress_is_its_own_equilibrated_stress(mesh):
 def test_the_nearest_stress_does_not_depend_on_the_numbering():
     """On a strip that is held all around; its elements have stresses of their own."""
     strip, energies = skfem.MeshTri.init_tensor(np.linspace(0, 1, 5), [0.0, 0.7]), []
-    stress = np.random.default_rng(1).standard_normal((strip.nelements, 1, 2, 2))
-    stress = np.repeat(stress + stress.swapaxes(2, 3), 3, axis=1)
+    stress = np.random.default_rng(1).standard_normal((strip.nelements, 1, 4))
+    stress[..., 3] = MATERIAL.nu * (stress[..., 0] + stress[..., 1])
+    stress = np.repeat(stress, 18, axis=1)
     for order in (
         np.arange(strip.nvertices),
         np.random.default_rng(2).permutation(strip.nvertices),
     ):
         place = np.argsort(order)
-        cells = Simplices(skfem.MeshTri(strip.p[:, order], place[strip.t], sort_t=False))
+        mesh = skfem.MeshTri(strip.p[:, order], place[strip.t], sort_t=False)
+        cells = EquilibriumElements(mesh, 1, False)
         held = (cells.mesh.f2t[1] < 0)[:, None] & np.ones((1, 2), dtype=bool)
         none = np.zeros((*held.shape, 2))
         made, unbalanced = cells.equilibrated(MATERIAL, stress, np.zeros(2), held, none)
@@ -303,7 +304,7 @@ def test_the_bound_is_the_error_where_the_stress_is_linear():
     part = Part("b", mesh, MATERIAL, sides, (BodyForce((0.0, -150.0)),))
     scene = Scene("s", part, Rigid("floor"), 0.0, law="frictionless")
     solved = solve_scene(scene)
-    bound, cells = Bound(solved), Simplices(mesh)
+    bound, cells = Bound(solved), EquilibriumElements(mesh, 1, False)
     modulus, x = 1000.0 * 0.7 / (1.3 * 0.4), cells.quadratic(mesh.p)
     exact = np.stack([0 * x[0], 150.0 / modulus * (x[1] ** 2 / 2 - x[1])])
     found = bound.scene.nodal(solved.reduction.displaced(solved.solution))[0]
@@ -379,25 +380,23 @@ def test_the_stress_of_a_bilinear_displacement():
     assert np.isclose(whole, flat @ energy @ flat, rtol=1e-4)
 
 
-@pytest.mark.parametrize(("dim", "halvings"), [(2, 4), (3, 3)])
-def test_the_constant_of_uneven_tractions_is_proved(dim, halvings):
+def test_the_constant_of_uneven_tractions_is_proved():
     """By composite stresses from above, and by displacements from below."""
-    most = composite(dim, halvings) / (1 - 0.5**halvings)
-    assert 0.99 * CONSTANT[dim] < most <= CONSTANT[dim]
-    points = regular_simplex(dim).mesh.p
-    assert compatible(points, Material(1.0, 0.0), np.eye(dim), halvings) > 0.77 * CONSTANT[dim]
+    most = composite(3) / (1 - 0.5**3)
+    assert 0.99 * CONSTANT < most <= CONSTANT
+    points = regular_tetrahedron().mesh.p
+    assert compatible(points, Material(1.0, 0.0), np.eye(3), 3) > 0.77 * CONSTANT
 
 
-@pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("shape", ["regular", "tall", "flat", "any"])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
-def test_no_uneven_traction_needs_more_energy_than_its_bound(dim, shape, nu):
+def test_no_uneven_traction_needs_more_energy_than_its_bound(shape, nu):
     """The worst of all tractions for a displacement of fine elements, in simplices of any shape;
     the bound is that of a turned simplex in other units as well.
     """
-    random = np.random.default_rng(dim)
+    random, dim = np.random.default_rng(3), 3
     height = {"tall": 4.0, "flat": 0.25}.get(shape, 1.0)
-    points = np.diag([1.0] * (dim - 1) + [height]) @ regular_simplex(dim).mesh.p
+    points = np.diag([1.0] * (dim - 1) + [height]) @ regular_tetrahedron().mesh.p
     if shape == "any":
         points = points + 0.2 * random.standard_normal(points.shape)
     material = Material(1000.0, nu)
@@ -412,8 +411,7 @@ def test_no_uneven_traction_needs_more_energy_than_its_bound(dim, shape, nu):
 def weight_of(points, material):
     """W: a traction d on the facet of the first vertices needs at most the energy int d' W d."""
     dim = len(points)
-    kind = skfem.MeshTri if dim == 2 else skfem.MeshTet
-    cells = Simplices(kind(points, np.arange(dim + 1)[:, None]))
+    cells = Tetrahedra(skfem.MeshTet(points, np.arange(dim + 1)[:, None]))
     size, first = measures(points[:, :dim, None]), np.zeros(1, dtype=int)
 
     def energy(d):
@@ -601,12 +599,13 @@ def test_a_quantity_without_a_bound_is_refused():
 
 def test_a_search_says_bound_or_estimate():
     scene = on_floor()
-    _, found = refine([scene], "approach", 0.02, adaptive=True)
+    _, found = refine([scene], "approach", 0.02, adaptive=True, bound=True)
     assert found.guarantee.sentence.startswith("bound:") and found.guarantee.bound < 0.1
-    _, found = refine([make_scene("punch-2d", mu=0.0)], "approach", 0.05)
+    _, found = refine([make_scene("punch-2d", mu=0.0)], "approach", 0.05, bound=True)
     assert found.guarantee.bound < 0.1
-    _, found = refine([make_scene("punch-3d")], "approach", 0.05)
+    _, found = refine([make_scene("punch-3d")], "approach", 0.05, bound=True)
     assert found.guarantee.sentence.startswith("estimate, no bound: body")
+    assert refine([scene], "approach", 0.1)[1].guarantee is None
 
 
 def test_a_search_stops_its_solvers_in_time_unless_a_tolerance_is_asked_for():

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -70,6 +71,13 @@ def differences(scene, folder, factor=100.0):
 )
 def test_reactions_agree_within_one_percent(name, arguments, tmp_path):
     moved, reactions = differences(scenes.make_scene(name, **arguments), tmp_path)
+    assert moved < 0.01 and reactions < 0.01
+
+
+@needs_ccx
+def test_sheets_in_plane_stress_agree(tmp_path):
+    scene = replace(scenes.make_scene("punch-2d", elements=8), kind="plane-stress")
+    moved, reactions = differences(scene, tmp_path)
     assert moved < 0.01 and reactions < 0.01
 
 

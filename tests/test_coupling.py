@@ -308,7 +308,7 @@ def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     scene = scenes.flat_punch(2, elements=4)  # 5 contacts: 10 x 10 entries, 800 bytes
     monkeypatch.setattr(operators, "NOTABLE_BYTES", 800)
     with caplog.at_level("INFO"):
-        reduce(scene, Q="explicit")
+        reduce(scene, Q="explicit", solver="superlu")
     assert "10 x 10 entries: 800 bytes" in caplog.text and "solver superlu" in caplog.text
     assert "explicit Q of 10 unknowns" in caplog.text
     monkeypatch.setattr(operators, "MOST_BYTES", 799)

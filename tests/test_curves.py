@@ -9,6 +9,7 @@ from conftest import MATERIAL
 
 from contactopt import InputError, Part, Rigid, Scene, Support, reduce
 from contactopt.meshes.cells import straight, volumes
+from contactopt.meshes.given_curves import check_curve
 from contactopt.meshes.mesh_refinement import (
     TooSmall,
     bent,
@@ -242,3 +243,63 @@ def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
     for name, (i, at) in sides.items():
         flat = (np.abs(fine.p[i, fine.facets[:, outer]] - at) < 1e-12).all(axis=0)
         assert np.array_equal(fine.boundaries[name], outer[flat])
+
+
+def round_body(shape, second, n=5):
+    """A quarter of a body of revolution about z between two planes through the axis, and the
+    function that is zero on its outer surface, here the radius less that of the section.
+    """
+    radius = {
+        "cone": lambda z: 2 - 0.4 * z,
+        "torus": lambda z: 1 + np.sqrt(1 - (z - 0.5) ** 2),
+        "groove": lambda z: 3 - np.sqrt(1 - (z - 0.5) ** 2),
+        "spline": lambda z: 2 + 0.2 * np.sin(2 * z),
+    }[shape]
+    mesh = skfem.MeshTet.init_tensor(
+        np.linspace(0, np.pi / 2, n + 1), np.linspace(0, 1, 3), np.linspace(0, 1, 4)
+    ).with_boundaries({"outer": lambda x: x[1] == 1, "foot": lambda x: x[2] == 0})
+    if second:
+        mesh = replace(skfem.MeshTet2.from_mesh(mesh), _boundaries=mesh.boundaries)
+    a, depth, z = mesh.doflocs
+    r = radius(z) - 0.8 * (1 - depth)
+    made = replace(mesh, doflocs=np.stack([r * np.cos(a), r * np.sin(a), z]))
+    return made, lambda x: np.hypot(x[0], x[1]) - radius(x[2])
+
+
+@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("shape", ["cone", "torus", "groove", "spline"])
+def test_surfaces_that_are_no_spheres_are_met_up_to_their_rims(shape, second):
+    """New nodes are far nearer to the surface than the chords are, those on the rims too, and the
+    curve that a mesh itself makes is never refused.
+    """
+    mesh, off = round_body(shape, second)
+    curves = boundary_curves(mesh)
+    fine = straight(mesh)
+    chords = split(fine, {})
+    for _ in range(2):
+        fine = split(fine, curves)
+        check_curve(curves["outer"], fine, "outer")
+    assert curves["foot"] is None
+    outer, flat = (np.unique(fine.facets[:, fine.boundaries[name]]) for name in ("outer", "foot"))
+    height = np.abs(off(chords.p[:, np.unique(chords.facets[:, chords.boundaries["outer"]])])).max()
+    assert np.abs(off(fine.p[:, outer])).max() < 0.2 * height
+    assert np.abs(fine.p[2, flat]).max() < 1e-12
+
+
+@pytest.mark.parametrize("shape", ["cone", "groove", "spline"])
+def test_what_is_guessed_of_a_surface_has_another_shape(shape):
+    """It lies between the guess and the chords, about as far from the guess as that is wrong."""
+    mesh, off = round_body(shape, False, n=4)
+    curves = boundary_curves(mesh)
+    guess, known = curves["outer"], boundary_curves(round_body(shape, True)[0])["outer"]
+    facets = mesh.facets[:, mesh.boundaries["outer"]]
+    middles = (mesh.p[:, facets] + mesh.p[:, np.roll(facets, 1, axis=0)]).reshape(3, -1) / 2
+    error, doubt = np.abs(off(guess(middles))), guess(middles) - guess.other(middles)
+    assert known.other is None and curves["foot"] is None
+    assert np.abs(doubt).max() > 0.5 * error.max()
+    assert np.abs(doubt).max() < 0.8 * np.abs(guess(middles) - middles).max()
+
+
+def test_a_sphere_and_a_cylinder_have_one_shape():
+    assert boundary_curves(simplices(cylinder_sector()))["inner"].other is None
+    assert boundary_curves(skfem.MeshTet.init_ball(2))[""].other is None

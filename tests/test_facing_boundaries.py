@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from deck_shapes import block, element_rows, node_rows
 
 import contactopt
 from contactopt import InputError
@@ -125,3 +126,38 @@ def test_what_cannot_be_found_is_told_in_a_sentence(tmp_path, old, new, words):
     path.write_text(TWO_SHELVES.replace(old, new))
     with pytest.raises(InputError, match=words):
         read_scene_file(path)
+
+
+def body_of_nodes(name, shape, at):
+    """Lines of a deck: a block, the set of all of its nodes, and those of two of its sides."""
+    sets = {
+        name: list(shape.nodes),
+        f"{name}_low": shape.on(1, at),
+        f"{name}_up": shape.on(1, at + 2),
+    }
+    rows = "\n".join(f"*NSET, NSET={n}\n" + ",\n".join(map(str, own)) for n, own in sets.items())
+    return (
+        f"*NODE\n{node_rows(shape)}\n*ELEMENT, TYPE=CPE4, ELSET={name}\n"
+        f"{element_rows(shape.elements)}\n{rows}\n"
+    )
+
+
+@pytest.mark.parametrize("elements", [2, 1])
+def test_nodes_of_a_whole_body_are_no_surface_that_may_touch(tmp_path, elements):
+    """Gmsh's option SaveGroupsOfNodes writes the nodes of each body as a set; so does HyperMesh. A
+    set that holds a support is no surface either. With one element there is no node inside.
+    """
+    low = block("quad", 1, (elements, 2))
+    up = block("quad", 1, (elements, 2), first=101, at=(0.0, 2.0, 0.0))
+    text = body_of_nodes("LOWER", low, 0.0) + body_of_nodes("UPPER", up, 2.0)
+    both = [*low.on(1, 0.0), *low.on(0, 0.0)]
+    text += "*NSET, NSET=CORNER\n" + ",\n".join(map(str, both)) + "\n"
+    (tmp_path / "two.inp").write_text(text)
+    (tmp_path / "two.toml").write_text(
+        'contacts = "auto"\nmu = 0.3\n[bodies.up]\nmesh = "two.inp"\ngroup = "UPPER"\n'
+        'material = { E = 1000, nu = 0.3 }\ntractions = [{ boundary = "UPPER_up", y = -1 }]\n'
+        '[bodies.low]\nmesh = "two.inp"\ngroup = "LOWER"\nmaterial = { E = 1000, nu = 0.3 }\n'
+        'supports = [{ boundary = "LOWER_low", x = 0, y = 0 }]\n'
+    )
+    (pair,) = read_scene_file(tmp_path / "two.toml").states[0].pairs
+    assert (pair.upper, pair.lower) == ("up:UPPER_low", "low:LOWER_up")

@@ -2,13 +2,14 @@
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
 from contactopt import InputError, InterfaceProblem, fclib, siconos_residual, solve
 from contactopt.linear.operators import dense
 from contactopt.problem.laws.bilateral import Bilateral
+
+h5py = pytest.importorskip("h5py")
 
 FOLDER = Path(__file__).parents[2] / "shared" / "fclib"
 FILES = sorted(FOLDER.glob("*.hdf5"))

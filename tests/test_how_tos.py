@@ -35,6 +35,7 @@ PAGES = (
 BLOCK = re.compile(r"```(python|toml|sh|text)\n(.*?)```", re.S)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_runs_as_it_stands(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

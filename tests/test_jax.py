@@ -46,6 +46,7 @@ def test_both_directions_agree_with_differences(dim):
     assert abs(backward - difference) < 1e-7 * max(1.0, abs(backward))
 
 
+@pytest.mark.slow
 def test_transformations_compose():
     Q, q, mu, V, s = data()
     many = jnp.stack([q, 1.1 * q])
@@ -58,6 +59,7 @@ def test_transformations_compose():
     assert np.allclose(rows, columns, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_systems_of_several_problems_are_told_apart():
     # a Jacobian has many right sides of one system, and vmap many systems
     Q, q, _, V, s = data()

@@ -31,11 +31,13 @@ from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.krylov import krylov_step, model_of
 from contactopt.methods.kernels.subproblems import KrylovSubproblem
 from contactopt.methods.newton import Newton
+from contactopt.methods.preconditioners import degrees
 from contactopt.problem import dimensionless
 from contactopt.problem.chart import Chart, nodal_weights
 from contactopt.scenes import make_scene
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
+from tests.stacks import layered
 
 SMALL = {"punch-2d": 16, "sphere": 12, "punch-3d": 4}
 
@@ -283,7 +285,7 @@ def test_iterative_bodies_are_solved_with_their_contacts_from_cold(tmp_path):
 
 
 def test_trailing_product_needs_no_interior():
-    reduction = reduce_bodies(scenes.flat_punch(2, elements=6))
+    reduction = reduce_bodies(scenes.flat_punch(2, elements=6), solver="superlu")
     body = reduction.bodies[0]
     assert isinstance(body.solver, SuperLUSolver) and body.solver.trailing_triangle is not None
     force = np.random.default_rng(0).normal(size=len(body.interface))
@@ -320,3 +322,35 @@ def test_operators_that_share_their_work_count_together():
     assert np.all(shifted(Q, np.arange(4.0)) @ x == 2 + np.arange(4)) and Q.products == 4
     other = Q.scaled(3.0, np.zeros(4))
     assert np.all(other @ x == 6) and (other.products, Q.products) == (1, 4)
+
+
+@pytest.mark.parametrize(
+    ("dim", "elements", "count", "options"),
+    [
+        (2, 16, 4, {"Q": "implicit", "solver": "superlu"}),
+        (2, 16, 8, {"Q": "implicit", "solver": "superlu"}),
+        (3, 4, 4, {"Q": "implicit", "solver": "superlu"}),
+        (2, 16, 4, {"solver": "multigrid"}),
+    ],
+)
+def test_thin_tied_layers_are_solved_from_products_with_q(dim, elements, count, options):
+    """Layers tied to each other are the whole body. The thinnest of eight is a hundred times wider
+    than high, and held by tied pairs alone.
+    """
+    scene = scenes.flat_punch(dim, elements=elements)
+    problem = reduce(layered(scene, count), **options)
+    assert problem.Q.diagonal.min() >= 0.0  # signs of one pair say nothing of another
+    pieces = solve(problem, "newton", tol=1e-8, max_iterations=12)
+    whole = solve(reduce(scene, Q="explicit"), "newton", tol=1e-11)
+    assert pieces.solved
+    error = np.abs(pieces.reactions[problem.pairs[0].contacts] - whole.reactions).max()
+    assert error < 1e-6 * np.abs(whole.reactions).max()
+
+
+def test_smooth_motions_grow_with_the_length_of_a_pair_over_its_distance_to_the_next():
+    thick, thin = (
+        reduce(layered(scenes.flat_punch(2, elements=8, foundation_height=height), 2), Q="explicit")
+        for height in (160.0, 10.0)
+    )
+    assert degrees(reduce(scenes.flat_punch(2, elements=8))) == [1] == degrees(thick)[:1]
+    assert degrees(thin)[1] > degrees(thick)[1]

@@ -456,7 +456,7 @@ def test_two_bodies_of_calculix_with_their_own_nodes_sets_and_surfaces(tmp_path)
         assert len(low.boundaries["BOTH"]) == 6 and "FLOOR" not in up.boundaries
     for old, new, words in (
         ("101,102", "999,102", "names a node that is not there"),
-        ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "cannot be read as abaqus"),
+        ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "line 25: an element C3D20R lacks"),
         ("*Heading", "*INCLUDE, INPUT=two.inp", "include each other"),
         ("TYPE=C3D20", "TYPE=C3D21", "elements of type C3D21R are not known"),
         ("up, S1", "upper, S1", "there is no set upper of elements"),
@@ -635,6 +635,32 @@ def test_exodus_files_keep_the_names_of_blocks_and_their_side_sets(tmp_path, hdf
         load_mesh(path)
 
 
+def test_exodus_blocks_and_sides_that_are_not_known_are_refused(tmp_path):
+    """What a file names is read or refused; shells on a brick are a surface of it."""
+    h5py = pytest.importorskip("h5py")
+
+    def change(**values):
+        exodus_bricks(tmp_path / "a.exo", True)
+        with h5py.File(tmp_path / "a.exo", "a") as file:
+            for name, (value, kind) in values.items():
+                if name in file:
+                    del file[name]
+                file[name] = np.array(value)
+                if kind:
+                    file[name].attrs["elem_type"] = np.bytes_(kind)
+        return load_mesh(tmp_path / "a.exo", "low")
+
+    for values in (
+        {"connect3": ([[41, 42, 43, 44]], "NSIDED")}, {"side_ss1": ([1, 7, 1], "")},
+        {"elem_ss1": ([1, 2, 4], "")}, {"node_ns1": ([1, 2, 99], "")},
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=r"not known|not there"):
+            change(**values)
+    low = change(connect3=([[1, 2, 3, 4]], "SHELL4"), elem_ss1=([3], ""), side_ss1=([2], ""))
+    assert len(low.boundaries["tip"]) == len(low.boundaries["side 1"]) == 1
+    assert flux(low, "tip") == pytest.approx(0) and volume(low) == pytest.approx(1)
+
+
 def test_groups_of_med_files_keep_their_names(gmsh, tmp_path):
     pytest.importorskip("h5py")
     disc_in_plate(gmsh, tmp_path / "a.msh", 3, 2)
@@ -781,3 +807,82 @@ def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence
         except InputError as error:
             refused += "\n" not in str(error)
     assert refused > (trial + 1) / 2
+
+
+@pytest.mark.parametrize("order,serendipity", [(1, 1), (2, 1), (2, 0)])
+def test_formats_of_gmsh_hold_the_same_bricks(gmsh, tmp_path, caplog, order, serendipity):
+    """A curved body of bricks, saved by Gmsh in every format: volume and area of the lower side."""
+    occ = gmsh.model.occ
+    line = occ.addLine(occ.addPoint(1, 0, 0), occ.addPoint(2, 0, 0))
+    ring = occ.revolve([(1, line)], 0, 0, 0, 0, 0, 1, np.pi / 2, [3], recombine=True)
+    face = next(tag for dim, tag in ring if dim == 2)
+    made = occ.extrude([(2, face)], 0, 0, 1, [2], recombine=True)
+    occ.synchronize()
+    body = next(tag for dim, tag in made if dim == 3)
+    gmsh.model.addPhysicalGroup(3, [body], 7, name="body")
+    gmsh.model.addPhysicalGroup(2, [face], 8, name="low")
+    gmsh.option.setNumber("Mesh.SecondOrderIncomplete", serendipity)
+    gmsh.option.setNumber("Mesh.SaveGroupsOfNodes", 1)
+    gmsh.model.mesh.setTransfiniteCurve(line, 3)
+    gmsh.model.mesh.generate(3)
+    gmsh.model.mesh.setOrder(order)
+    gmsh.write(str(tmp_path / "a.msh"))
+    own = load_mesh(tmp_path / "a.msh", "body")
+    for form, file in ((0, "a.bdf"), (1, "b.bdf"), (2, "c.bdf"), (0, "a.inp"), (0, "a.med")):
+        gmsh.option.setNumber("Mesh.BdfFieldFormat", form)
+        gmsh.option.setNumber("Mesh.SaveElementTagType", 2)
+        gmsh.write(str(tmp_path / file))
+        group, side = ("7", "8") if file.endswith("bdf") else ("body", "low")
+        if file.endswith("bdf") and order == 2 and not serendipity:
+            with pytest.raises(InputError, match="CHEXA has more than 20 nodes"):
+                load_mesh(tmp_path / file, group)
+            continue
+        caplog.clear()
+        other = load_mesh(tmp_path / file, group)
+        assert volume(other) == pytest.approx(volume(own), rel=1e-4)
+        assert flux(other, side) == pytest.approx(flux(own, "low"), rel=1e-4)
+        assert not caplog.text
+
+
+def test_families_of_med_may_be_missing(gmsh, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    disc_in_plate(gmsh, tmp_path / "a.msh", 3, 2)
+    gmsh.write(str(tmp_path / "a.med"))
+    with h5py.File(tmp_path / "a.med", "a") as file:
+        (mesh,) = file["ENS_MAA"].values()
+        (step,) = mesh.values()
+        del step["MAI/TR6/FAM"]
+    disc = load_mesh(tmp_path / "a.med", "disc")
+    assert volume(disc) == pytest.approx(volume(load_mesh(tmp_path / "a.msh", "disc")), rel=1e-12)
+    assert "rim" not in (disc.boundaries or {})
+
+
+def test_parametric_nodes_of_the_older_format_of_gmsh(gmsh, tmp_path):
+    gmsh.option.setNumber("Mesh.SaveParametric", 1)
+    for dim in (2, 3):
+        disc_in_plate(gmsh, tmp_path / f"{dim}.msh", dim, 2, version=2.2)
+        assert "$ParametricNodes" in (tmp_path / f"{dim}.msh").read_text()
+        gmsh.option.setNumber("Mesh.SaveParametric", 0)
+        gmsh.write(str(tmp_path / "plain.msh"))
+        gmsh.option.setNumber("Mesh.SaveParametric", 1)
+        for name in ("disc", "plate"):
+            own, other = (load_mesh(tmp_path / f"{n}.msh", name) for n in (dim, "plain"))
+            assert volume(own) == pytest.approx(volume(other), rel=1e-12)
+            assert flux(own, "rim") == pytest.approx(flux(other, "rim"), rel=1e-12)
+    text = (tmp_path / "3.msh").read_text()
+    for cut in range(len(text) // 4, len(text) - 20, len(text) // 23):
+        (tmp_path / "cut.msh").write_text(text[:cut])
+        with pytest.raises(InputError, match=r"cannot be read|holds no"):
+            load_mesh(tmp_path / "cut.msh", "disc")
+    gmsh.option.setNumber("Mesh.Binary", 1)
+    gmsh.write(str(tmp_path / "binary.msh"))
+    with pytest.raises(InputError, match="parametric nodes"):
+        load_mesh(tmp_path / "binary.msh", "disc")
+
+
+def test_partitioned_files_of_gmsh_are_refused(gmsh, tmp_path):
+    disc_in_plate(gmsh, tmp_path / "a.msh", 2, 1)
+    gmsh.model.mesh.partition(2)
+    gmsh.write(str(tmp_path / "a.msh"))
+    with pytest.raises(InputError, match="partition"):
+        load_mesh(tmp_path / "a.msh")

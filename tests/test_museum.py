@@ -152,7 +152,7 @@ def test_dragged_plate(answered):
     for p, a in answered("dragged_plate"):
         plate = [[0.0], [1.0]], [p["s"]]
         problem = InterfaceProblem(coupled(p), [[p["q_n"], 0.0]], p["mu"], *plate)
-        forces = np.array([p["coupling"] * p["s"] - p["q_n"], -p["s"]])
+        forces = np.array([max(p["coupling"] * p["s"] - p["q_n"], 0.0), -p["s"]])
         if p["mu"] * forces[0] >= abs(p["s"]):
             assert same(a["forces"], forces), p
             assert same(solve(problem).reactions[0], forces), p
@@ -288,9 +288,28 @@ def test_seminorm(answered):
         symbol = np.fft.fft(column).real[: m + 1]
         assert same(a["column"], column) and same(a["symbol"], symbol)
         assert same(a["at"], symbol[a["j"]]) and same(a["rowSum"], column.sum())
+        pairs = (np.pi / (2 * m * np.sin(np.pi * np.arange(1, 2 * m) / (2 * m)))) ** 2
+        energies = np.fft.fft([pairs.sum(), *-pairs]).real[: m + 1]  # of all pairs of nodes
+        assert same(a["full"], energies)
         assert (abs(column.sum()) < 1e-12) == (m & (m - 1) == 0)
         if m & (m - 1) == 0:  # two bounds that do not depend on m
             assert 1.2 < a["low"] <= a["high"] < 5
+
+
+@browser_needed
+def test_non_monotone(answered):
+    signs = set()
+    for p, a in answered("non_monotone"):
+        slips, normal = np.array([p["u_1"], p["u_2"]]), np.array([p["r_1"], p["r_2"]])
+        assert same(a["shear"], -np.sign(slips) * p["mu"] * normal)
+        assert same(a["product"], -np.diff(a["shear"])[0] * -np.diff(slips)[0])
+        if slips[0] * slips[1] > 0:  # along the loop friction opposes the slip of the law
+            way = np.linspace(*slips, 1001)
+            force = -np.sign(way[0]) * p["mu"] * normal[:, None] * np.ones(1001)
+            work = np.trapezoid(force[0], way) + np.trapezoid(force[1], way[::-1])
+            assert same(a["loop"], work), p
+        signs.add(a["product"] > 1e-12)
+    assert signs == {True, False}
 
 
 def test_the_bounds_of_the_symbol_do_not_grow():
@@ -315,6 +334,32 @@ def test_certified_and_wrong(answered):
             assert same(a["derivative"], change[0, 0])
 
 
+ON_SCREEN = """(() => {
+  const box = (id) => document.getElementById(id).getBoundingClientRect();
+  const parts = ["verdict", "figures", "sliders", "rows"].map(box);
+  return [Math.min(...parts.map((b) => b.top)), Math.max(...parts.map((b) => b.bottom))];
+})()"""
+
+
+@pytest.mark.slow
+@browser_needed
+@pytest.mark.parametrize("size", [(1280, 720), (400, 800)])
+@pytest.mark.parametrize("name", ROOMS)
+def test_picture_sliders_and_numbers_share_the_screen(name, size, museum, tmp_path):
+    museum.write(tmp_path)
+    with Browser(tmp_path / f"{name}.html", *size) as page:
+        page.wait("window.sliders")
+        for number in range(page.ask("document.querySelectorAll('button').length")):
+            page.ask(f"document.querySelectorAll('button')[{number}].click()")
+            top, bottom = page.ask(ON_SCREEN)
+            assert top >= 0 and bottom <= size[1], (number, top, bottom)
+            letters = page.ask("getComputedStyle(document.querySelector('svg text')).fontSize")
+            scale = "(s => s.getBoundingClientRect().width / s.viewBox.baseVal.width)"
+            shown = page.ask(f"{scale}(document.querySelector('#figures svg'))")
+            assert float(letters.removesuffix("px")) * shown >= 11.5
+
+
+@pytest.mark.slow
 @browser_needed
 @pytest.mark.parametrize("name", ROOMS)
 def test_a_room_can_be_read_and_used(name, museum, tmp_path):

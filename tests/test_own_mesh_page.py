@@ -17,6 +17,7 @@ def blocks(kind):
     return re.findall(rf"```{kind}\n(.*?)```", PAGE, re.S)
 
 
+@pytest.mark.slow
 def test_the_page_runs_from_gmsh_to_the_pressure(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     mesh, solve = blocks("python")

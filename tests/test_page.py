@@ -257,6 +257,7 @@ SEEN = """(() => {
 SAME = "painter.pixels.reduce((sum, pixel) => (31 * sum + pixel) | 0, 0)"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 @pytest.mark.parametrize("width", [1280, 400])
 @pytest.mark.parametrize("name", ["flat", "solid", "path"])
@@ -298,6 +299,7 @@ def exposed(folder):
     return file
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_the_slider_moves_the_bodies_and_any_column_of_the_history_is_drawn(folder):
     change = (
@@ -319,6 +321,7 @@ def test_the_slider_moves_the_bodies_and_any_column_of_the_history_is_drawn(fold
         assert not browser.faults
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_solids_are_cut_and_mirrored(folder):
     change = (

@@ -3,7 +3,6 @@ from dataclasses import replace
 
 import meshio
 import numpy as np
-import pandas as pd
 import pytest
 from conftest import MATERIAL, block, two_blocks
 
@@ -246,6 +245,8 @@ def test_a_state_that_nothing_can_hold_is_named():
 
 
 def test_files_of_a_path(cycle, tmp_path):
+    import pandas as pd
+
     cycle.write(tmp_path / "new")
     assert {p.name for p in (tmp_path / "new").iterdir()} == {"history.csv", "path.npz"}
     table = pd.read_csv(tmp_path / "new" / "history.csv")
@@ -273,6 +274,8 @@ def test_run_follows_the_path_of_a_named_scene(tmp_path):
 
 def check_files_of_states(result, folder):
     """Every state has its rows and its files, and the series names each of them once."""
+    import pandas as pd
+
     count, (pair,) = len(result.path.states), result.problem.pairs
     table = pd.read_csv(folder / f"contact-{pair.name}.csv")
     assert list(table.state) == list(np.repeat(np.arange(1, count + 1), result.problem.contacts))

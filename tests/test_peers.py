@@ -68,6 +68,7 @@ def separate():
 """
 
 
+@pytest.mark.slow
 def test_a_peer_is_timed_where_it_runs_and_its_failures_cost_a_row_each(tmp_path):
     written(tmp_path, TOY, "toy.py")
     written(tmp_path, SEPARATE, "separate.py")
@@ -120,6 +121,7 @@ def test_a_plane_problem_reaches_a_peer_in_space_and_without_units():
     assert 0.1 < np.abs(seen["q"]).max() < 10.0 and 0.1 < seen["data"].max() < 10.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("module", [siconos_numerics, pinocchio_admm])
 def test_solvers_of_others_find_the_certified_answer(module):
     try:
@@ -179,6 +181,7 @@ def alone(folder, text, **options):
     return benchmark.load(benchmark.run_campaign(path, out, jobs=1, quiet=True, **options))
 
 
+@pytest.mark.slow
 def test_slow_runs_are_not_repeated_and_hopeless_ones_are_not_made(tmp_path):
     written(tmp_path, SLOW, "slow.py")
     written(tmp_path, SEPARATE, "separate.py")

@@ -1,7 +1,6 @@
 """Who is first: times at the accuracy reached, rank intervals, reruns, busy machines."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from contactopt.benchmark.ranking import (
@@ -16,6 +15,8 @@ from contactopt.benchmark.ranking import (
     wall_over_cpu,
     warning,
 )
+
+pd = pytest.importorskip("pandas")
 
 
 def rows(method, curve, problem="p", repeat=0, wall=1.0, limit=10.0):

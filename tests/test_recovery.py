@@ -10,11 +10,12 @@ from conftest import MATERIAL
 import contactopt
 from contactopt import InputError, Part, Rigid, Scene, Support, scenes
 from contactopt.bodies.element_stress import fields_of, nodal_stress
-from contactopt.bodies.fields import STRESSES, Region, von_mises, von_mises_slopes
+from contactopt.bodies.fields import Region, von_mises, von_mises_slopes
 from contactopt.bodies.stress_recovery import stress_map
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.readings.places import place_of, read_place, read_stress
 from contactopt.scenes import make_scene
+from contactopt.scenes.kinds import KINDS
 from contactopt.solving.solve_scene import solve_scene
 
 TICKS = np.linspace(0, 1, 5) ** 1.3
@@ -95,17 +96,17 @@ def test_the_recovered_stress_converges_faster_than_averages(degree):
     assert errors["fit"][0] / errors["fit"][1] > 1.8 * degree
 
 
-@pytest.mark.parametrize("kind", STRESSES)
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_load_is_the_transpose_of_the_recovery(kind):
     random = np.random.default_rng(1)
     body = assembled(MESHES["tetrahedra" if kind == "solid" else "triangles"], 1, kind)
     found = stress_map(body, Region("top"))
     U, slopes = (
         random.standard_normal(body.basis.N),
-        random.standard_normal((len(found.sources), len(STRESSES[kind]))),
+        random.standard_normal((len(found.sources), len(KINDS[kind].stresses))),
     )
     assert np.sum(found.stress(U) * slopes) == pytest.approx(found.transposed(slopes) @ U)
-    stress = random.standard_normal((5, len(STRESSES[kind])))
+    stress = random.standard_normal((5, len(KINDS[kind].stresses)))
     change = random.standard_normal(stress.shape)
     difference = (von_mises(stress + 1e-6 * change) - von_mises(stress - 1e-6 * change)) / 2e-6
     assert np.allclose(np.sum(von_mises_slopes(stress) * change, axis=1), difference, atol=1e-8)

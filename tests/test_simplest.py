@@ -27,7 +27,8 @@ from contactopt import (
 from contactopt.bodies.fields import Region
 from contactopt.meshes.polar import ring
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
-from contactopt.readings.quantities import approach, elastic_energy
+from contactopt.readings.plate_motions import approach
+from contactopt.readings.quantities import elastic_energy
 from contactopt.simplification import images
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
 
@@ -82,7 +83,7 @@ def _middles(mesh: skfem.Mesh, boundary: str) -> np.ndarray:
 def numbers(solved: Solved) -> np.ndarray:
     """Energy, approach, total force, largest pressure: of the whole, whatever part is modelled."""
     problem, r = solved.reduction.problem, solved.solution.reactions
-    own = approach(problem, solved.solution)
+    own = approach(solved.reduction, solved.solution)
     energy = elastic_energy(solved.reduction, solved.solution)
     return np.array([energy, own or 0.0, r[:, 0].sum(), (r[:, 0] / problem.areas).max()])
 

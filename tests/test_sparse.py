@@ -8,8 +8,7 @@ from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual
 from contactopt.benchmark.families.packings import packing
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.linear.operators import asymmetry, block, dense, diagonal, held, shifted
-from contactopt.methods.kernels.homotopy import Homotopy, homotopy_iterates
-from contactopt.methods.kernels.interior import Path, interior_iterates
+from contactopt.methods.kernels.interior import interior_iterates
 from contactopt.methods.kernels.sparse_blocks import DenseBlocks, SparseBlocks
 from contactopt.problem import dimensionless
 
@@ -80,63 +79,6 @@ def test_block_systems_dense_and_sparse_agree(stack):
     one = SparseBlocks(stack.Q, d).factor(left, added, kept)(right)
     two = DenseBlocks(stack.Q.toarray(), d).factor(left, added, kept)(right)
     assert np.allclose(one, two, rtol=1e-8, atol=1e-10)
-
-
-def test_sign_of_the_determinant():
-    """Dense and sparse factors against LAPACK's determinant of the system written out; both signs
-    occur.
-    """
-    stack, rng = packing(2, 25, seed=3, points=2), np.random.default_rng(1)
-    k, d = stack.q.shape
-    signs = set()
-    for _ in range(8):
-        added, kept = rng.normal(size=(k, d, d)), np.repeat(rng.random(k) < 0.8, d)
-        whole = stack.Q.toarray()
-        for i in range(k):
-            whole[i * d : i * d + d, i * d : i * d + d] += added[i]
-        expected = np.linalg.slogdet(whole[np.ix_(kept, kept)])[0]
-        for form in (SparseBlocks(stack.Q, d), DenseBlocks(stack.Q.toarray(), d)):
-            assert form.factor(None, added, kept).sign() == expected
-        signs.add(float(expected))
-    assert signs == {-1.0, 1.0}
-
-
-def test_the_tangent_is_the_difference_quotient_of_the_path():
-    """Newton's steps at two values of t, from points on the tangent, vanish to second order."""
-    problem = dimensionless(packing(3, 12, seed=1, mu=0.6, points=2))[0]
-    path = Homotopy(problem, SparseBlocks(problem.Q, 3), np.linspace(5.0, 20.0, problem.contacts))
-    here = path.along(path.first)
-    assert here.size(here.back) < 1e-9  # the first point is on the path
-    way = here.tangent.times(-1.0 / here.size(here.tangent))
-    off = [path.along(path.first.plus(way.times(h))) for h in (2e-2, 1e-2)]
-    sizes = [ahead.size(ahead.back) for ahead in off]
-    assert sizes[0] < 1e-2 and sizes[0] / sizes[1] == pytest.approx(4.0, rel=0.2)
-
-
-@pytest.mark.parametrize("dim,bodies,mu,points", [(2, 25, 0.8, 1), (3, 18, 0.8, 3)])
-def test_a_path_that_turns_back_ends_at_a_solution(dim, bodies, mu, points, monkeypatch):
-    problem = packing(dim, bodies, mu=mu, points=points)
-    scaled, scales = dimensionless(problem)
-    matrix = SparseBlocks(scaled.Q, dim)
-    for full in (True, False):  # paths that do not turn end early
-        assert min(error for _, error in interior_iterates(scaled, matrix, Path(full))) > 1e-4
-    seen, along = [], Homotopy.along
-    monkeypatch.setattr(
-        Homotopy, "along", lambda self, point: seen.append(point.t) or along(self, point)
-    )
-    *_, (point, error) = homotopy_iterates(scaled, matrix, 1000)
-    assert error < 1e-8 and natural_map_residual(problem, *scales.to_physical(*point)) < 1e-6
-    assert np.any(np.diff(seen) > 0) and len(seen) < 300  # t has risen
-
-
-def test_a_path_with_a_plate():
-    V = np.tile(np.eye(3), (8, 1))
-    problem = InterfaceProblem(
-        sp.diags_array(np.tile([1.0, 0.5, 0.7], 8)).tocsr(), np.zeros((8, 3)), 0.5, V, [-4, 1.0, 0]
-    )
-    scaled, scales = dimensionless(problem)
-    *_, (point, error) = homotopy_iterates(scaled, SparseBlocks(scaled.Q, 3), 200)
-    assert error < 1e-8 and natural_map_residual(problem, *scales.to_physical(*point)) < 1e-6
 
 
 def test_a_plate_on_a_sparse_compliance():

@@ -5,8 +5,10 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
+from textwrap import indent
 
 import pytest
 
@@ -29,7 +31,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    """Built from a copy of the sources, so that nothing is left behind in the repository."""
+    """Built from the source distribution of a copy of the sources: nothing is left behind here."""
     source = tmp_path_factory.mktemp("source")
     names = [
         *ROOT.joinpath("contactopt").rglob("*"),
@@ -40,7 +42,7 @@ def wheel(tmp_path_factory) -> Path:
             target = source / path.relative_to(ROOT)
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(path.read_bytes())
-    run(sys.executable, "-m", "build", "--wheel", "--outdir", source / "dist", source, cwd=source)
+    run(sys.executable, "-m", "build", "--outdir", source / "dist", source, cwd=source)
     (path,) = (source / "dist").glob("contactopt-*.whl")
     return path
 
@@ -72,3 +74,96 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     code = "import contactopt; print(contactopt.__version__, contactopt.__file__)"
     version, place = run(binaries / "python", "-c", code, cwd=tmp_path).split()
     assert version in wheel.name and str(tmp_path) in place
+    user = tmp_path / "user.py"
+    user.write_text(
+        "import contactopt\nreveal_type(contactopt.run('punch-2d').solution.residual)\n"
+    )
+    told = run(sys.executable, "-m", "mypy", "--python-executable", binaries / "python", user,
+               cwd=tmp_path)  # fmt: skip
+    assert '"builtins.float"' in told, "users' type checkers see the types"
+
+
+# what each extra is for, tried in an environment that has this extra alone
+TRIED = {
+    "fclib": """
+from contactopt import fclib, reduce, scenes
+problem = reduce(scenes.flat_punch(2, elements=4))
+fclib.write(problem, "problem.hdf5")
+assert fclib.read("problem.hdf5").contacts == problem.contacts
+""",
+    "backends": """
+from contactopt import reduce, scenes, solve
+from contactopt.methods.backends import CONIC, QP
+problem = reduce(scenes.flat_punch(2, elements=4))
+extra = {"daqp", "ecos", "highs", "piqp", "quadprog", "scs"}
+assert extra <= {*QP, *CONIC}
+for name in sorted(extra & set(QP)):
+    assert solve(problem, normal=name, tol=1e-6).solved, name
+assert solve(problem, tangential="ecos", tol=1e-6).solved
+""",
+    "fast": """
+import contactopt
+assert contactopt.run("punch-2d", solver="pardiso").solution.solved
+""",
+    "jax": """
+import jax
+jax.config.update("jax_enable_x64", True)
+from contactopt import scenes
+from contactopt.jax import quantity
+value = quantity(scenes.flat_punch(2, elements=4), "approach", ("mu",))
+assert abs(jax.grad(value)(jax.numpy.array([0.1]))[0]) > 0
+""",
+    "view": """
+import contactopt
+page = contactopt.run("punch-2d", elements=4).view("page.html", show=False)
+assert page.stat().st_size > 100_000
+""",
+    "benchmark": """
+from pathlib import Path
+from textwrap import indent
+from contactopt.cli import main
+text = '[[problems]]\\nscene = "punch-2d"\\nelements = 4\\n[[methods]]\\nmethod = "auto"\\n'
+Path("few.toml").write_text('name = "few"\\ntitle = "few"\\n' + text)
+assert main(["bench", "few.toml", "--out", "out"]) == 0
+assert main(["report", "out"]) == 0
+""",
+    "mesh": """
+import gmsh
+gmsh.initialize()
+gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+gmsh.model.occ.synchronize()
+gmsh.write("box.step")
+gmsh.finalize()
+from contactopt.cli import main
+assert main(["mesh", "box.step", "--out", "box.msh"]) == 0
+""",
+}
+INTO_DOCS = ("experiments", "reports", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("extra", [*TRIED, "docs"])
+def test_each_extra_alone_does_what_it_is_for(wheel, tmp_path, extra):
+    run(sys.executable, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
+    python = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
+    run(python, "-m", "pip", "install", "--quiet", f"{wheel}[{extra}]", cwd=tmp_path)
+    if extra != "docs":
+        run(
+            python,
+            "-c",
+            f"if __name__ == '__main__':\n{indent(TRIED[extra], '    ')}",
+            cwd=tmp_path,
+        )
+        return
+    # the pages, as README says; what they execute is executed where README's commands are typed
+    for name in INTO_DOCS:
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, tmp_path / name)
+    build = ("-W", "--keep-going", "-b", "html", "-D", "nb_execution_mode=off")
+    run(python, "-m", "sphinx", *build, "experiments/site", "out/site", cwd=tmp_path)
+    assert (tmp_path / "out" / "site" / "index.html").exists()
+
+
+def test_no_extra_is_left_untried():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert set(extras["optional-dependencies"]) == {*TRIED, "docs", "test"}

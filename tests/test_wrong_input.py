@@ -4,7 +4,6 @@ once gave.
 
 import os
 
-import h5py
 import numpy as np
 import pytest
 
@@ -34,6 +33,8 @@ def test_a_file_that_never_ends_is_not_waited_for(tmp_path):
 
 def test_nothing_is_read_from_other_files(tmp_path):
     """A link of the whole problem, of one group, and data that lie outside."""
+    import h5py
+
     sound(tmp_path / "secret.hdf5")
     with h5py.File(tmp_path / "whole.hdf5", "w") as file:
         file["fclib_local"] = h5py.ExternalLink("secret.hdf5", "/fclib_local")
@@ -65,6 +66,8 @@ def test_sizes_that_a_file_only_declares_take_no_memory(tmp_path, name):
     """A file of some kilobytes that announces 8 terabytes: a data set without data, which HDF5
     reads as zeros.
     """
+    import h5py
+
     path = sound(tmp_path / "huge.hdf5")
     with h5py.File(path, "a") as file:
         kind = file[f"fclib_local/{name}"].dtype

@@ -50,8 +50,7 @@ recovery does not see where the solution is not smooth. Much of it shows in the 
 and its estimated error together, which would be the same on every mesh if the estimates were exact.
 What the last two refinements changed of it is therefore added to the sum, which has a factor of
 safety of 1.25, unless the reading is more uncertain than that (indicators.misfit). So the estimate
-is not a bound. A guaranteed bound is made at the end, where there is one
-(contactopt.accuracy.bound).
+is not a bound. A guaranteed bound is made at the end where it is asked for (contactopt.bounds).
 
 Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
 finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for

@@ -16,15 +16,11 @@ corners of plates in extension.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from contactopt.accuracy.estimate import Level
-from contactopt.bodies.fields import Region
-from contactopt.meshes.cells import straight
-from contactopt.meshes.curves import CORNER
-from contactopt.meshes.structured import simplices
+from contactopt.readings.corners import at_re_entrant
 from contactopt.readings.peaks import Peak, Reading, at_rim
 from contactopt.readings.resultants import views
 from contactopt.solving.solve_scene import Solved
@@ -67,47 +63,11 @@ def _singular(solved: Solved, peak: Peak) -> bool:
         pairs, first = solved.reduction.problem.pairs, peak.contacts[0]
         number = next(i for i, pair in enumerate(pairs) if pair.start <= first < pair.stop)
         return at_rim(*views(solved.reduction, solved.solution)[number])
-    read = solved.reduction.bodies[peak.body].stress_map(Region())
-    assert read is not None  # the stress was read from its elements
-    mesh = straight(read.mesh)
-    return re_entrant(mesh, int(np.argmin(np.linalg.norm(mesh.p - peak.place[:, None], axis=0))))
-
-
-def re_entrant(mesh: Any, vertex: int) -> bool:
-    """Whether a vertex, or one within two elements of it, is at a re-entrant corner of the body or
-    on such an edge.
-
-    The recovered stress at the corner itself looks from all sides, and may be less than that next
-    to it.
-    """
-    cells = simplices(mesh, alike=False)
-    near = np.array([vertex])
-    for _ in range(2):
-        near = np.unique(cells.t[:, np.any(np.isin(cells.t, near), axis=0)])
-    outer = np.intersect1d(near, cells.boundary_nodes())
-    return any(filled(cells, node) > 0.5 + CORNER / (2 * np.pi) for node in outer)
-
-
-def filled(cells: Any, vertex: int) -> float:
-    """The share of the full angle around a vertex that the simplices at it fill [-]."""
-    corner, element = np.nonzero(cells.t == vertex)
-    others = np.stack([np.delete(cells.t[:, e], c) for c, e in zip(corner, element)], axis=1)
-    arms = cells.p[:, others] - cells.p[:, [vertex]][:, :, None]
-    arms = arms / np.linalg.norm(arms, axis=0)
-    if len(arms) == 2:
-        cosines = np.clip(np.sum(arms[:, 0] * arms[:, 1], axis=0), -1, 1)
-        return float(np.arccos(cosines).sum() / (2 * np.pi))
-    a, b, c = arms[:, 0], arms[:, 1], arms[:, 2]
-    volume = np.abs(np.sum(a * np.cross(b, c, axis=0), axis=0))
-    # Van Oosterom, Strackee (1983)
-    angles = 2 * np.arctan2(volume, 1 + np.sum(a * b + b * c + c * a, axis=0))
-    return float(angles.sum() / (4 * np.pi))
+    return at_re_entrant(solved.reduction, peak)
 
 
 def _kept(levels: Sequence[Level]) -> list[float]:
-    """The values of the levels at the place of the last one, from fine to coarse, each for elements
-    clearly larger.
-    """
+    """The values of the levels at the place of the last one, each for clearly larger elements."""
     last = levels[-1]
     kept: list[Level] = []
     for level in reversed(levels):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from contactopt.bounds.guarantee import Guarantee
 from contactopt.cards import count, line
 from contactopt.readings.peaks import Reading
 from contactopt.readings.quantities import Quantity
@@ -50,37 +50,6 @@ class Level:
         return f"{made}{self.contacts} contacts, estimated error {error}"
 
 
-@dataclass(frozen=True)
-class Guarantee:
-    """What is guaranteed on the last mesh, for its own shape (contactopt.accuracy.bound).
-
-    bound    of the error of the quantity over its value [-]; None where there is none, and then
-             `missing` says why
-    energy   `error`, the bound of the error of the displacement in the energy norm over its norm
-             [-], and its parts `mesh`, `contact`, `friction`, `moved` and `solver`; empty where
-             there is none
-    assumed  under which condition both hold; empty if under none
-    """
-
-    bound: float | None = None
-    energy: Mapping[str, float] = field(default_factory=dict)
-    missing: str = ""
-    assumed: str = ""
-
-    @property
-    def sentence(self) -> str:
-        """The same in words."""
-        parts = [f"{name} {value:.1e}" for name, value in self.energy.items() if name != "error"]
-        energy = ""
-        if self.energy:
-            energy = f" Bound in the energy norm: {self.energy['error']:.1e} ({', '.join(parts)})."
-        if self.assumed and (energy or self.bound is not None):
-            energy += f" This holds {self.assumed}."
-        if self.bound is None:
-            return f"estimate, no bound: {self.missing}{energy}"
-        return f"bound: the relative error is at most {self.bound:.1e}.{energy}"
-
-
 @dataclass(frozen=True, repr=False)
 class Estimate:
     """What is known of a quantity after the last solve.
@@ -93,9 +62,9 @@ class Estimate:
     grading_error   signed part of it that falls with the size of the elements away from the contact
                     [-]
     geometry_error  part of it that no refinement removes, because the meshes do not tell the shape
-                    of a boundary [-]
+                    of a boundary, or because curved surfaces overlap as they are drawn [-]
     order           observed order of convergence; None if it was not observed
-    guarantee       what of the error is not estimated but bounded
+    guarantee       what of the error is not estimated but bounded; None if that was not asked for
     reached         whether the error is at most the target
     message         one sentence that says how the search ended
     levels          all solves, in their order
@@ -110,7 +79,7 @@ class Estimate:
     grading_error: float | None
     geometry_error: float
     order: float | None
-    guarantee: Guarantee
+    guarantee: Guarantee | None
     reached: bool
     message: str
     levels: tuple[Level, ...]

@@ -16,6 +16,7 @@ from contactopt.bodies.protocol import Body
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.states import duals_of
 from contactopt.errors import InputError
+from contactopt.readings.corners import infinite
 from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.state import State
 from contactopt.scenes.scene import BodyForce
@@ -148,23 +149,13 @@ def _of_shape(
     return np.asarray(work - curved * energy)
 
 
-def read_once(solved: Solved, name: str) -> dict[str, float | None]:
-    """Read a quantity from a solution, with the error that this one mesh lets expect.
+def read_once(solved: Solved, name: str) -> dict[str, Any]:
+    """Read a quantity from a solution: its "value", its relative "error", None where one mesh says
+    nothing of it, and a "message" where it is infinite or missing. InputError if the scene does not
+    have it.
 
-    Parameters
-    ----------
-    solved : The solved scene.
-    name : Of contactopt.readings.quantities.
-
-    Returns
-    -------
-    "value" [unit of the quantity] and "error", relative; None where one mesh says nothing of it.
-        Of a load path it is the error of the last state, after the slip that the states before it
-        found on this mesh.
-
-    Raises
-    ------
-    InputError : For a quantity that the scene does not have.
+    For a load path it is the error of the last state, after the slip that the states before it
+    found on this mesh.
     """
     quantity = find_quantity(name, solved.reduction.scene)
     reading = read(quantity, solved)
@@ -175,8 +166,10 @@ def read_once(solved: Solved, name: str) -> dict[str, float | None]:
         errors = element_errors(last, quantity, reading.value)
         size = np.inf if errors.unsigned else errors.size
     size += reading.uncertainty
-    known = np.isfinite(size) and reading.value != 0 and not reading.missing
-    return {"value": reading.value, "error": size / abs(reading.value) if known else None}
+    message = reading.missing or infinite(solved.reduction, solved.solution, reading)
+    known = np.isfinite(size) and reading.value != 0 and not message
+    error = size / abs(reading.value) if known else None
+    return {"value": reading.value, "error": error} | ({"message": message} if message else {})
 
 
 def along_path(
@@ -241,7 +234,7 @@ def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
         own, points = pressure[pair.contacts], problem.coordinates[:, pair.contacts]
         edges = points[:, cells[:, 1:]] - points[:, cells[:, :1]]
         size = np.sqrt(np.linalg.det(np.einsum("dfa,dfb->fab", edges, edges)))[:, None]
-        ring = reduction.scene.kind == "axisymmetric"
+        ring = reduction.scene.analysis.revolved
         p, r = own[cells], points[0][cells] if ring else np.ones(cells.shape)
         (sum_p, sum_r), corner = (x.sum(axis=1, keepdims=True) for x in (p, r)), cells.ravel()
         both = np.sum(p * r, axis=1, keepdims=True)

@@ -9,19 +9,20 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from contactopt.accuracy.bound import bounded
 from contactopt.accuracy.corners import unbounded
 from contactopt.accuracy.estimate import Estimate, Judged, Level, read
 from contactopt.accuracy.everywhere import SWING, Everywhere
 from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
+from contactopt.bounds import bounded
 from contactopt.checks import check_number
+from contactopt.defaults import TOL
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
 from contactopt.readings.peaks import Peak, Reading
 from contactopt.readings.quantities import Quantity, quantity_of_states
 from contactopt.readings.resolution import coarse
+from contactopt.readings.validity import overlap_share
 from contactopt.scenes.scene import Scene
 from contactopt.solving.limits import Limits
 from contactopt.solving.progress import resident_memory
@@ -34,6 +35,7 @@ WATCHED = 1.5
 SAME_PEAK = 8.0  # elements by which a peak moves at most from one mesh to the next
 UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
 TENTH = 0.1  # of the accuracy may be the solver's (experiments.questions.bounds)
+NEGLIGIBLE = 1e-6  # share of the areas of surfaces that overlap, by which they are the same
 ROUNDING = 1e-15  # least relative error: no reading is exact
 
 
@@ -44,34 +46,19 @@ def refine(
     options: Options | None = None,
     limits: Limits | None = None,
     adaptive: bool = False,
+    bound: bool = False,
 ) -> tuple[Solved, Estimate]:
-    """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
+    """Solve a scene, or a load path of several states, on meshes just fine enough for the relative
+    `accuracy` of one quantity, and estimate its error. InputError, before anything is solved, for a
+    quantity that the scene does not have and an accuracy out of range, and where the first mesh has
+    no solution.
 
     Meshes are refined everywhere, or with `adaptive` where the quantity needs it, each body by
     itself; a mortar coupling joins what no longer matches, and quadrilaterals and hexahedra become
     triangles and tetrahedra. Each solve begins with the last answer. The search ends short of the
-    target, with a sentence in the estimate, where the quantity does not converge or does not exist,
-    where the next mesh would pass a limit, and where a solve or a refinement fails.
-
-    Parameters
-    ----------
-    states : The scene, or the states of its load path.
-    quantity : A name of contactopt.readings.quantities, such as 'pressure', 'pressure:block-floor'
-        or 'von_mises:block:fillet'.
-    accuracy : Bound on the estimated relative error of the quantity, between 0 and 1.
-    options : How each mesh is solved.
-    limits : On unknowns, time and memory.
-    adaptive : Whether meshes are refined only where the quantity needs it.
-
-    Returns
-    -------
-    The scene solved on the last mesh, which is the best answer where a bound ended the search, and
-    the Estimate.
-
-    Raises
-    ------
-    InputError : For an unknown quantity, body, boundary, pair or place and an accuracy out of
-        range, before anything is solved; and where the first mesh has no solution.
+    target, with a sentence in the estimate and with the best answer, where the quantity does not
+    converge or does not exist, where the next mesh would pass a limit, and where a solve or a
+    refinement fails. With `bound` it ends with a guaranteed bound (contactopt.bounds).
     """
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     scene = states[-1]
@@ -87,7 +74,7 @@ def refine(
         search = Locally(tuple(states), asked, options, not adaptive)
     else:
         search = Everywhere(tuple(states), quantity, options)
-    return _Loop(asked, accuracy, options, limits or Limits(), search).run()
+    return _Loop(asked, accuracy, options, limits or Limits(), search, bound).run()
 
 
 def _in_time(options: Options, accuracy: float) -> Options:
@@ -115,6 +102,7 @@ class _Loop:
     options: Options
     limits: Limits
     search: Everywhere | Locally
+    bound: bool
     levels: list[Level] = field(default_factory=list)
     peaks: list[tuple[Peak, ...]] = field(default_factory=list)
     solved: Solved | None = None
@@ -173,7 +161,8 @@ class _Loop:
                 **facts,
             )
         )
-        self.options.note(f"{self.quantity.name} {reading.value:.6g}, estimated error {error:.1e}")
+        said = f"{self.quantity.name} {reading.value:.6g}, estimated error {error:.1e}"
+        self.options.note(f"mesh {len(self.levels)}: {said}")
         return self._stop()
 
     def _stop(self) -> str:
@@ -260,24 +249,13 @@ class _Loop:
         assert self.solved is not None
         value, judged = self.reading.value, self.judged
         last, scale = self.levels[-1], abs(self.reading.value) or 1.0
-        # the error that the shape of guessed boundaries makes [unit of the quantity]
-        geometry, sentence = 0.0, ""
-        if not self.vain and not self.reading.missing:
-            try:
-                geometry, sentence = self.search.geometry(value, self.states)
-            except InputError as failure:
-                log.info("the other shape of guessed boundaries was not solved: %s", failure)
+        geometry, sentence = self._shape()
         known = last.error is not None and not self.vain and np.isfinite(geometry)
-        error = last.error + geometry / scale if known and last.error is not None else None
+        error = last.error + geometry if known and last.error is not None else None
         reached = self.reached and error is not None and error <= self.accuracy
-        if sentence:
-            if self.reached and not reached:
-                message = "the geometry keeps the target out of reach"
-            if geometry > 0:
-                sentence = (
-                    f"{geometry / scale:.1e} of the error is that of the geometry, since {sentence}"
-                )
-            message = f"{message}; {sentence}"
+        if self.reached and not reached:
+            message = "the geometry keeps the target out of reach"
+        message = f"{message}; {sentence}" if sentence else message
         seconds = dict(self.solved.solution.seconds)
         earlier = max(last.seconds - sum(seconds.values()), 0.0)
         seconds["coarse"] = seconds.get("coarse", 0.0) + earlier
@@ -291,10 +269,36 @@ class _Loop:
             error,
             judged.mesh / scale if signed else None,
             judged.grading / scale if signed else None,
-            geometry / scale if np.isfinite(geometry) else 1.0,
+            geometry if np.isfinite(geometry) else 1.0,
             judged.order,
-            bounded(self.solved, self.quantity, value),
+            bounded(self.solved, self.quantity, value) if self.bound else None,
             reached,
             message,
             tuple(self.levels),
         )
+
+    def _shape(self) -> tuple[float, str]:
+        """The relative error that no mesh removes, since the shape of guessed boundaries is not
+        known, and that of surfaces that overlap is not either; and a sentence on them.
+        """
+        assert self.solved is not None
+        value, geometry, said = self.reading.value, 0.0, []
+        if self.vain or self.reading.missing:
+            return 0.0, ""
+        try:
+            guessed, sentence = self.search.geometry(value, self.states)
+        except InputError as failure:
+            log.info("the other shape of guessed boundaries was not solved: %s", failure)
+            guessed, sentence = 0.0, ""
+        if sentence:
+            geometry = guessed / (abs(value) or 1.0)
+            part = f"{geometry:.1e} of the error is that of the geometry, since "
+            said.append(f"{part if geometry > 0 else ''}{sentence}")
+        overlap = overlap_share(self.solved.reduction, self.solved.solution)
+        if overlap > NEGLIGIBLE:
+            said.append(
+                f"{overlap:.1e} of the error is that of small displacements, since curved surfaces"
+                " overlap as they are drawn, and their areas differ by as much"
+            )
+            geometry += overlap
+        return geometry, "; ".join(said)

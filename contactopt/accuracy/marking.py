@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from contactopt.accuracy.polygon import Chords, chords_of, flatter
+from contactopt.accuracy.polygon import other_polygon
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
 from contactopt.meshes.given_curves import Curve
-from contactopt.meshes.mesh_refinement import bent, divide, facets_of, slivers, split
+from contactopt.meshes.mesh_refinement import Function, bent, divide, facets_of, slivers, split
 from contactopt.meshes.structured import simplices
 from contactopt.readings.peaks import Peak
 from contactopt.scenes.refined_scenes import part_curves
@@ -33,11 +33,12 @@ class Shapes:
     """What the meshes of a scene stand for.
 
     curves   name of the body -> name of the boundary -> curve
-    guessed  name of the body -> name of the boundary -> its edges, where the curve is a guess
+    guessed  name of the body -> name of the boundary, where the curve is a guess -> its other
+             shape, a function of points on the curve; None where no edge is in doubt
     """
 
     curves: Mapping[str, Mapping[str, Curve]]
-    guessed: Mapping[str, Mapping[str, Chords]]
+    guessed: Mapping[str, Mapping[str, Function | None]]
 
     @property
     def names(self) -> str:
@@ -49,8 +50,7 @@ class Shapes:
     @property
     def doubtful(self) -> bool:
         """Whether a guess may be wrong."""
-        chords = [own for found in self.guessed.values() for own in found.values()]
-        return any(bool(np.any(doubt > 0)) for _, _, doubt in chords)
+        return any(other is not None for own in self.guessed.values() for other in own.values())
 
     def of(self, part: Any) -> Mapping[str, Curve]:
         return self.curves.get(part.name, {})
@@ -66,7 +66,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
     (contactopt.meshes.curves).
     """
     curves: dict[str, dict[str, Curve]] = {}
-    guessed: dict[str, dict[str, Chords]] = {}
+    guessed: dict[str, dict[str, Function | None]] = {}
 
     def prepared(part: Any) -> Any:
         if not hasattr(part, "build_mesh"):
@@ -74,9 +74,10 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
         given = part.build_mesh(FIRST, scene.zone)
         cut = simplices(given) if simplicial else straight(given)
         found = curves[part.name] = part_curves(part, given)
-        unsure = [name for name, curve in found.items() if not getattr(curve, "known", False)]
         guessed[part.name] = {
-            name: chords_of(cut, facets_of(cut, name)) for name in unsure if scene.dim == 2
+            name: other_polygon(cut, facets_of(cut, name)) if scene.dim == 2 else curve.other
+            for name, curve in found.items()
+            if not curve.known
         }
         own = {name: found[name] for name in scene.surfaces_of(part) if name in found}
         return replace(part, mesh=cut, curve=own or None)
@@ -85,9 +86,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
 
 
 def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
-    """The scene as it is solved: with quadratic displacements the edges follow the curved
-    boundaries.
-    """
+    """The scene as it is solved: edges of quadratic displacements follow the curved boundaries."""
     if scene.degree == 1:
         return scene
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
@@ -104,16 +103,18 @@ def left_out(part: Any, shapes: Shapes) -> np.ndarray:
 
 
 def otherwise(scene: Scene, shapes: Shapes) -> Scene:
-    """The scene with every guessed boundary in its other shape (contactopt.accuracy.polygon), as it
-    is solved.
+    """The scene with every guessed boundary in its other shape (contactopt.accuracy.polygon, and in
+    space contactopt.meshes.facet_surfaces), as it is solved.
     """
 
     def moved(part: Part) -> Any:
         points, curves = part.mesh.p.copy(), dict[str, Any](shapes.of(part))
-        for name, chords in shapes.guessed.get(part.name, {}).items():
+        for name, other in shapes.guessed.get(part.name, {}).items():
+            if other is None:
+                continue
             nodes = np.unique(part.mesh.facets[:, facets_of(part.mesh, name)])
-            points[:, nodes] = flatter(points[:, nodes], chords)
-            curves[name] = partial(lambda own, ends, x: flatter(own(x), ends), curves[name], chords)
+            points[:, nodes] = other(points[:, nodes])
+            curves[name] = partial(lambda own, other, x: other(own(x)), curves[name], other)
         mesh = replace(part.mesh, doflocs=points)
         return mesh if scene.degree == 1 else bent(mesh, curves)
 
@@ -152,9 +153,7 @@ def _with_meshes(scene: Scene, mesh: Callable[[Part], Any]) -> Scene:
 
 
 def unknowns(scene: Scene) -> int:
-    """The displacement components of all nodes of the meshes, at least as many as a mesh has
-    unknowns.
-    """
+    """The displacement components of all nodes of the meshes, at least as many as the unknowns."""
     total = 0
     for mesh in (part.mesh for part in scene.parts if hasattr(part, "mesh")):
         inner = (mesh.nfacets if scene.dim == 2 else mesh.nedges) if scene.degree == 2 else 0

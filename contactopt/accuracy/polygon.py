@@ -14,6 +14,8 @@ of its two ends. What it changes is the error of the geometry, which no refineme
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,14 @@ from scipy.spatial import cKDTree
 Chords = tuple[np.ndarray, np.ndarray, np.ndarray]
 SAME = 1e-3  # relative difference of curvatures that rounding of files makes
 NEAREST = 8  # edges among which that of a point is looked for
+
+
+def other_polygon(mesh: Any, facets: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
+    """The other shape of a boundary of a plane mesh, a function of points on the smooth line; None
+    where no edge is in doubt.
+    """
+    chords = chords_of(mesh, facets)
+    return partial(flatter, chords=chords) if np.any(chords[2] > 0) else None
 
 
 def chords_of(mesh: Any, facets: np.ndarray) -> Chords:

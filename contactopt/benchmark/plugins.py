@@ -30,7 +30,7 @@ PASSED = ("tol", "time_limit", "max_iterations")
 @dataclass(frozen=True)
 class Plugin:
     """make: a function problem -> answer, or a class whose objects have `iterate`
-    (contactopt.methods.method.Method). `peer` is the solver of others that it calls, if any.
+    (contactopt.methods.method.Method). `peer` is the external solver that it calls, if any.
     """
 
     name: str
@@ -107,7 +107,7 @@ def method(make: Any = None, *, name: str | None = None, peer: Peer | None = Non
     ----------
     make : The function or class, where the decorator is written without arguments.
     name : The name of the method; by default that of the function.
-    peer : The solver of others that it calls, without which it is left out.
+    peer : The external solver that it calls, without which it is left out.
 
     Returns
     -------

@@ -306,7 +306,7 @@ def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame)
     places = {v: i for i, v in enumerate(values)}
     lines = (
         ("guaranteed_mu", "--", "alternating iteration contracts for every load below"),
-        ("alternating_mu", "-", "does not for some load from here on"),
+        ("alternating_mu", "-", "right of this line some load diverges"),
     )
     for column, style, label in lines:
         known = rows.groupby(other)[column].median().dropna()

@@ -217,7 +217,7 @@ def _cards(table: pd.DataFrame) -> list[dict[str, Any]]:
                 "times divided by": _plain(rows["factor"].iloc[0]),
                 "wall over CPU": _plain(wall_over_cpu(rows)),
                 "versions": versions,
-                "solvers of others": ", ".join(sorted(backends - {"", "native"})),
+                "external solvers": ", ".join(sorted(backends - {"", "native"})),
                 "tolerances asked": ", ".join(f"{t:g}" for t in sorted(set(rows["tolerance"]))),
                 "time limit [s]": ", ".join(f"{t:g}" for t in sorted(set(rows["time_limit"]))),
                 "from": rows["time"].min(),

@@ -11,10 +11,10 @@ from typing import Any
 
 from contactopt.benchmark.plugins import Registry
 from contactopt.benchmark.problems import ProblemSpec, short_number
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.methods import METHODS, find_method
 from contactopt.methods.backends import CONIC, QP
-from contactopt.methods.driver import TOL
 from contactopt.methods.method import NATIVE
 
 SETTINGS = {"default": TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
@@ -22,7 +22,7 @@ SETTINGS = {"default": TOL, "low": 1e-3, "mid": 1e-6, "high": 1e-9}
 
 @dataclass(frozen=True)
 class MethodSpec:
-    """A method or plug-in with settings, and the solver of others that it calls."""
+    """A method or plug-in with settings, and the external solver that it calls."""
 
     name: str
     settings: Mapping[str, Any] = field(default_factory=dict)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.benchmark.keys import COLUMNS, ENDS
+from contactopt.defaults import install
 from contactopt.errors import InputError
 from contactopt.files.writing import check_folder, whole_file
 from contactopt.problem import Status
@@ -38,10 +39,7 @@ def require(*modules: str) -> None:
     """InputError, with what to install, if one of these packages is missing."""
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
-        raise InputError(
-            f"benchmarks need {', '.join(missing)}; install with: pip install"
-            " 'contactopt[benchmark]'"
-        )
+        raise InputError(f"benchmarks need {', '.join(missing)}; {install('benchmark')}.")
 
 
 class Store:

@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import Any
 
 from contactopt.bodies.assembled import AssembledBody
-from contactopt.bodies.ranks import RemotePart
 from contactopt.errors import InputError
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
@@ -22,7 +21,6 @@ BODIES: dict[type, tuple[str, str, str]] = {
         "assemble_elastic",
         "finite elements with linear elasticity",
     ),
-    RemotePart: (f"{ROOM}.remote", "assemble_remote", "finite elements on another rank"),
     Rigid: (f"{ROOM}.rigid", "assemble_rigid", "a rigid body"),
     HalfSpace: (
         f"{ROOM}.half_space",
@@ -33,22 +31,9 @@ BODIES: dict[type, tuple[str, str, str]] = {
 
 
 def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> AssembledBody:
-    """Assemble the body that models one part of a scene.
-
-    Parameters
-    ----------
-    scene, part : The scene and one of its parts.
-    elements, zone : Number of elements across the contact half-width, and the half-width that the
-        mesh resolves [length].
-
-    Returns
-    -------
-    The body as matrices, whose linear system is not solved yet.
-
-    Raises
-    ------
-    InputError : For a part of a class that no kind of body models, and for parts that cannot be
-        modelled.
+    """The body that models one part of a scene, with `elements` across the half-width `zone`
+    [length] of the contact; its linear system is not solved yet. InputError for a part that no kind
+    of body models.
     """
     for kind in type(part).__mro__:  # the class itself before what it derives from
         if kind in BODIES:
@@ -57,6 +42,5 @@ def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> Asse
                 scene, part, elements, zone
             )
             return made
-    # which no user writes
-    known = ", ".join(kind.__name__ for kind in BODIES if kind is not RemotePart)
+    known = ", ".join(kind.__name__ for kind in BODIES)
     raise InputError(f"a body of a scene must be one of {known}; got {type(part).__name__}.")

@@ -35,6 +35,7 @@ class Mesh:
     picked     for each component the sparse matrix (s, n) that takes the body's unknowns to it
     curve      function (dim, j) -> (dim, j) that puts points of the facets on the surface that the
                mesh stands for; None: the facets are this surface
+    thin       (f,) faces beneath which the body is thin (contactopt.bodies.thickness)
     """
 
     kind: str
@@ -46,6 +47,7 @@ class Mesh:
     held: np.ndarray
     picked: tuple[sp.csr_matrix, ...]
     curve: Callable[[np.ndarray], np.ndarray] | None
+    thin: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,25 +172,16 @@ class AssembledBody(ABC):
         return Work()
 
     def guides(self) -> Guides | None:
-        """Find where the body is and which planes guide it.
-
-        Returns
-        -------
-        Its extent, and planes that may be planes of symmetry; None for a body without nodes.
-        """
+        """Its extent, and planes that may be planes of symmetry; None for a body without nodes."""
         return None
 
+    @property
+    def held(self) -> np.ndarray:
+        """Numbers (p,) of its displacement unknowns that are prescribed."""
+        return np.zeros(0, dtype=int)
+
     def iterates(self, solver: str) -> bool:
-        """Say whether a solver of linear systems works by iteration on this body.
-
-        Parameters
-        ----------
-        solver : A name in contactopt.bodies.solvers.SOLVERS, or 'auto'.
-
-        Returns
-        -------
-        True for multigrid, False for factors.
-        """
+        """Whether a solver (a name in SOLVERS, or 'auto') works by iteration on this body."""
         return False
 
     @abstractmethod
@@ -209,10 +202,13 @@ class AssembledBody(ABC):
 class UndividedBody(AssembledBody, Body):
     """A body without a linear system, so that it is both stages, which moves freely as a whole in
     the components of its part that have a total force. In the others it is moved as given.
+
+    whole  (dim,) numbers of the unknowns that are its motion as a whole
     """
 
     part: Any
     components: tuple[str, ...]
+    whole: range
 
     @cached_property
     def name(self) -> str:
@@ -237,6 +233,11 @@ class UndividedBody(AssembledBody, Body):
         """(dim, p) unit translations in the components with a force."""
         columns = [self.components.index(name) for name in self.part.force or {}]
         return np.eye(len(self.components))[:, columns]
+
+    def carried(self, component: int) -> tuple[np.ndarray, np.ndarray]:
+        made = np.zeros(len(self.at_rest))
+        made[self.whole[component]] = 1.0
+        return made, 0 * made
 
     def prepare(self, solver: str, entries: bool) -> Self:
         return self

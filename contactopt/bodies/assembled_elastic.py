@@ -12,9 +12,10 @@ from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Wo
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import build_body
 from contactopt.bodies.elastic import ElasticBody, condense
-from contactopt.bodies.elements import face_nodes
+from contactopt.bodies.elements import mean_normals
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
+from contactopt.bodies.thickness import thin_facets
 from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve, check_curve
 from contactopt.scenes.scene import Part, Scene
@@ -36,6 +37,10 @@ class AssembledElastic(AssembledBody):
     @cached_property
     def unknowns(self) -> int:
         return len(self.body.free)
+
+    @cached_property
+    def held(self) -> np.ndarray:
+        return np.setdiff1d(np.arange(len(self.body.load)), self.body.free)
 
     def iterates(self, solver: str) -> bool:
         return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
@@ -76,7 +81,8 @@ class AssembledElastic(AssembledBody):
         places = body.locations[:, nodes]
         curve = self.part.curve_of(name)
         if curve is not None:
-            check_curve(curve, body.basis.mesh, name)
+            if curve.given:
+                check_curve(curve, body.basis.mesh, name)
             places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
@@ -95,16 +101,17 @@ class AssembledElastic(AssembledBody):
 
     def _mesh(self, name: str, held: np.ndarray, curve: Curve | None) -> Mesh:
         body, facets = self.body, np.asarray(self.body.basis.mesh.boundaries[name])
-        faces, outward = face_nodes(body.basis, body.degree, facets)
-        nodes, number = np.unique(faces, return_inverse=True)
+        trace = body.traces[name]
+        outward, nodes = mean_normals(body.basis, body.degree, facets), trace.copies
         unknowns, count = body.unknowns[:, nodes], np.arange(len(nodes) + 1)
         picked = (
             sp.csr_matrix((np.ones(len(nodes)), row, count), (len(nodes), len(held)))
             for row in unknowns
         )
-        kind, faces = body.basis.mesh.refdom.__name__, number.reshape(faces.shape)
+        kind = body.basis.mesh.refdom.__name__
         places = body.locations[:, nodes], held[unknowns], tuple(picked)
-        return Mesh(kind, body.degree, faces, outward, body.weight, *places, curve)
+        thin = thin_facets(body.basis.mesh, facets)
+        return Mesh(kind, body.degree, trace.faces, outward, body.weight, *places, curve, thin)
 
     def guides(self) -> Guides:
         """Coordinate planes, the body on one side, that supports hold along the axis alone."""
@@ -113,12 +120,11 @@ class AssembledElastic(AssembledBody):
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
         near = PLANE * float(np.ptp(extent, axis=1).max())
         planes = []
-        names = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[body.kind]
         for support in self.part.supports:
             given = support.displacement or {}
             if list(given.values()) != [0.0]:
                 continue
-            axis = names.index(next(iter(given)))
+            axis = body.kind.components.index(next(iter(given)))
             nodes = mesh.facets[:, np.asarray(mesh.boundaries[support.boundary])]
             low, high = extent[axis]
             for place, sign in ((low, 1.0), (high, -1.0)):

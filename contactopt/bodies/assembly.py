@@ -13,7 +13,8 @@ import skfem
 from contactopt.bodies.elements import Trace, Weight, node_unknowns
 from contactopt.bodies.motions import Motions
 from contactopt.bodies.stiffness import isotropic_stiffness
-from contactopt.material import Material, lame_by_poisson
+from contactopt.material import Material
+from contactopt.scenes.kinds import Kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Assembly:
     """
 
     name: str
-    kind: str
+    kind: Kind
     material: Material
     basis: skfem.CellBasis
     weight: Weight
@@ -73,7 +74,8 @@ class Assembly:
     @cached_property
     def by_poisson(self) -> sp.csr_matrix:
         """(n, n) derivative of the stiffness A by Poisson's ratio."""
-        return isotropic_stiffness(self.basis, lame_by_poisson(self.material), self.weight)
+        constants = self.kind.constants_by_poisson(self.material)
+        return isotropic_stiffness(self.basis, constants, self.weight)
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
         """The derivative (n,) of the elastic forces by 'E' or 'nu' at fixed U."""
@@ -98,3 +100,23 @@ class Assembly:
     def contact_dofs(self) -> np.ndarray:
         """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
         return np.asarray(self.unknowns[:, self.surface_nodes].T)
+
+    def carried(self, component: int) -> np.ndarray:
+        """Weights (n,) of the displacements that give the motion along a component: that of the
+        plates that move along it; else of the supports that move along it; else, where nothing
+        holds the body along it, the mean displacement.
+        """
+        own, n = self.unknowns[component], len(self.load)
+        moving = [column for column in self.motion.T if column[own].any()]
+        if not moving:
+            driven = np.zeros(n)
+            driven[own] = self.prescribed[own] != 0
+            supports = [own for name, own in self.holders.items() if name.startswith("support")]
+            parts = [np.bincount(own, driven[own], n) for own in supports]
+            moving = [part for part in parts if part.any()]
+        if moving:
+            return np.asarray(sum(column / column.sum() for column in moving) / len(moving))
+        fields, forces = self.rigid_motions.fields, self.rigid_motions.forces
+        others = np.delete(np.arange(n), own)
+        free = np.all(fields[own] == 1.0, axis=0) & ~np.any(fields[others], axis=0)
+        return np.asarray(forces[:, free].sum(axis=1))

@@ -8,14 +8,14 @@ are those of the whole body.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 import skfem
-from scipy.sparse.csgraph import connected_components
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.corners import copies
 from contactopt.bodies.elements import (
     Weight,
     contact_trace,
@@ -26,9 +26,10 @@ from contactopt.bodies.elements import (
 )
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
+from contactopt.bodies.thickness import thin_facets
 from contactopt.errors import InputError
-from contactopt.material import lame
-from contactopt.meshes.cells import SHAPES, overlapping, straight
+from contactopt.meshes.cells import SHAPES, joined, overlapping, straight
+from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
@@ -40,28 +41,24 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     """
     mesh = part.build_mesh(elements, zone)
     check_mesh(scene, part, mesh)
-    axisymmetric = scene.kind == "axisymmetric"
-    factors = {"plane-strain": scene.thickness, "axisymmetric": 2 * np.pi, "solid": 1.0}
-    weight = (factors[scene.kind] * scene.copies, axisymmetric)
-    basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, axisymmetric)
-    A = isotropic_stiffness(basis, lame(part.material), weight)
-    touching = sp.csr_matrix((np.ones(len(A.indices), dtype=np.int8), A.indices, A.indptr))
-    pieces = connected_components(touching, directed=False)[0]
-    if pieces > 1:
-        raise InputError(
-            f"body '{part.name}': its mesh falls into {pieces} pieces; remove nodes that belong to"
-            " no element, merge duplicated nodes, or model each piece as a body of its own."
-        )
+    kind = scene.analysis
+    weight = (kind.measure(scene.thickness) * scene.copies, kind.revolved)
+    basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
+    A = isotropic_stiffness(basis, kind.constants(part.material), weight)
     fixed = _constrained(scene, part, basis)
-    rigid_motions = free_motions(scene.kind, scene.components, basis, fixed.held, weight)
+    rigid_motions = free_motions(kind, basis, fixed.held, weight)
     check_free(part.name, A, rigid_motions)
     traces = {}
     for name in scene.surfaces_of(part):
-        tied = scene.laws_of(part, name) == {"tied"}
-        traces[name] = contact_trace(basis, scene.degree, mesh.boundaries[name], weight, tied)
+        laws = [find_law(law) for law in scene.laws_of(part, name)]
+        tied = bool(laws) and not any(law.bounded for law in laws)
+        facets = np.asarray(mesh.boundaries[name])
+        every = tied or bool(thin_facets(basis.mesh, facets).any())
+        copied = copies(basis, scene.degree, facets, mesh, part.curve_of(name))
+        traces[name] = contact_trace(basis, scene.degree, facets, weight, every, copied)
     return Assembly(
         part.name,
-        scene.kind,
+        kind,
         part.material,
         basis,
         weight,
@@ -109,22 +106,23 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
         or mesh.p.shape[0] != scene.dim
         or mesh.refdom.__name__ not in SHAPES
     ):
+        shapes = ("triangles or quadrilaterals", "tetrahedra or hexahedra")[scene.dim - 2]
         raise InputError(
             f"body '{part.name}': a {scene.kind} scene needs a scikit-fem mesh of dimension"
-            f" {scene.dim} made of triangles, quadrilaterals, tetrahedra or hexahedra; got"
-            f" {type(mesh).__name__}."
+            f" {scene.dim}, of {shapes}; got {_words(mesh)}."
         )
     if not np.all(np.isfinite(mesh.p)):
         raise InputError(
             f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers."
         )
+    _check_pieces(part, mesh)
     if (over := overlapping(mesh)) is not None:
         place = ", ".join(f"{x:g}" for x in mesh.p[:, mesh.t[:, over]].mean(axis=1))
         raise InputError(
             f"body '{part.name}': an element of the mesh lies over its neighbour, at ({place});"
             " move its nodes apart, or mesh this place anew."
         )
-    if scene.kind == "axisymmetric" and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
+    if scene.analysis.revolved and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
         raise InputError(
             f"body '{part.name}': an axisymmetric mesh lies in r >= 0; its least r is"
             f" {mesh.p[0].min():g}."
@@ -141,6 +139,39 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
                 else f"the mesh has no boundary named {name!r}"
             )
             raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
+
+
+def _words(mesh: Any) -> str:
+    """What a mesh that does not fit is."""
+    if not isinstance(mesh, skfem.Mesh):
+        return type(mesh).__name__
+    where = {1: "on a line", 2: "in a plane", 3: "in space"}[mesh.p.shape[0]]
+    return f"one of {mesh.nelements} elements {where}"
+
+
+def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:
+    """Raise InputError unless every element can be reached from every other across facets, and
+    every node belongs to one.
+    """
+    inner = mesh.f2t[:, mesh.f2t[1] >= 0]
+    piece = joined(inner, mesh.nelements)
+    pieces = len(np.unique(piece))
+    lost = mesh.nvertices - len(np.unique(mesh.t))
+    if pieces + lost == 1:
+        return
+    nodes = [np.unique(mesh.t[:, piece == own]) for own in np.unique(piece)]
+    shared = np.flatnonzero(np.bincount(np.concatenate(nodes)) > 1)
+    if len(shared):
+        place = ", ".join(f"{x:g}" for x in mesh.p[:, shared[0]])
+        raise InputError(
+            f"body '{part.name}': its mesh falls into {pieces} pieces that share nodes but no side"
+            f" of an element, such as the node at ({place}), around which they turn as around a"
+            " hinge; let them share a side, or model each piece as a body of its own."
+        )
+    raise InputError(
+        f"body '{part.name}': its mesh falls into {pieces + lost} pieces; remove nodes that belong"
+        " to no element, merge duplicated nodes, or model each piece as a body of its own."
+    )
 
 
 def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:

@@ -31,7 +31,8 @@ from contactopt.bodies.assembly import Assembly
 from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.meshes.cells import elements_of
-from contactopt.meshes.inp import FACES
+from contactopt.meshes.inp_elements import FACES
+from contactopt.problem.laws import find_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
@@ -76,15 +77,15 @@ def _check(scene: Scene) -> None:
                 f"body '{part.name}' has no mesh, and a deck of CalculiX needs one; make it a Part,"
                 " stiff where it is rigid."
             )
-    if scene.kind == "axisymmetric":
+    if not scene.analysis.deck:
         raise InputError(
             "CalculiX has other axisymmetric elements, and would not solve this scene; export a"
-            " scene in plane strain or in space."
+            " scene in the plane or in space."
         )
     if scene.degree != 1:
         raise InputError("a deck of CalculiX is written with linear elements; give degree = 1.")
     for pair in scene.pairs:
-        if pair.law != "coulomb" or callable(pair.mu) or np.ndim(pair.mu) > 0:
+        if not find_law(pair.law).plain_coulomb() or callable(pair.mu) or np.ndim(pair.mu) > 0:
             raise InputError(
                 f"contact '{pair.name}': a deck of CalculiX knows Coulomb's law with one number mu."
             )
@@ -111,8 +112,7 @@ class _Numbered:
     def elements(self) -> Iterator[str]:
         """Elements, material and section."""
         name, material = f"BODY{self.first_element + 1}", self.body.material
-        kind = "C3D" if self.scene.dim == 3 else "CPE"
-        yield f"*ELEMENT, TYPE={kind}{len(self.cells)}, ELSET={name}"
+        yield f"*ELEMENT, TYPE={self.scene.analysis.deck}{len(self.cells)}, ELSET={name}"
         for number, cell in enumerate(self.cells.T + self.first_node + 1, self.first_element + 1):
             yield ", ".join(map(str, [number, *cell]))
         constants = f"{_number(material.E)}, {_number(material.nu)}"

@@ -25,6 +25,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.bodies.assembly import Assembly
@@ -37,7 +38,7 @@ from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.bodies.stress_recovery import StressMap, stress_map
 from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.linear.operators import Product
-from contactopt.linear.saddle_point import LocalTerm
+from contactopt.linear.saddle_point import BodyTerm
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
@@ -108,8 +109,14 @@ class ElasticBody(Body):
 
     @cached_property
     def motion_names(self) -> tuple[str, ...]:
-        strongest = np.argmax(np.abs(self.modes[0]), axis=0) if self.modes[0].size else []
-        return (*(self.body.driven[i] for i in strongest), *self.body.rigid_motions.names)
+        own = self.modes[0]
+        alone = np.abs(own).sum(axis=1) == 1.0
+        leading = [int(np.argmax(alone & (column == 1.0))) for column in own.T]
+        return (*(self.body.driven[i] for i in leading), *self.body.rigid_motions.names)
+
+    def plates(self, U: np.ndarray) -> dict[str, float]:
+        columns = zip(self.body.driven, self.body.motion.T)
+        return {name: float(column @ U / column.sum()) for name, column in columns}
 
     @cached_property
     def elastic_modes(self) -> np.ndarray:
@@ -140,11 +147,11 @@ class ElasticBody(Body):
 
         return product
 
-    def term(self, T: sp.csr_matrix) -> LocalTerm | None:
+    def term(self, T: sp.csr_matrix) -> BodyTerm | None:
         if not self.solver.iterative or self.solver.iteration is None:
             return None
         entries, low_rank = self.body.A.diagonal()[self.kept], self._low_rank(T)
-        return LocalTerm(T[:, self.kept], *self.solver.iteration, entries, low_rank)
+        return BodyTerm(T[:, self.kept], *self.solver.iteration, entries, low_rank)
 
     def compliance(self, T: sp.csr_matrix) -> np.ndarray:
         # T G T' from the block of G on the contact unknowns, and what is of low rank
@@ -184,6 +191,10 @@ class ElasticBody(Body):
         U, Z = np.zeros(force.shape), self.body.rigid_motions.fields
         U[self.kept] = self.solver.solve(force[self.kept])
         return np.asarray(U - Z @ (self.relief.T @ force) - self.relief @ (Z.T @ force))
+
+    def carried(self, component: int) -> tuple[np.ndarray, np.ndarray]:
+        weights, E = self.body.carried(component), self.elastic_modes
+        return weights, np.asarray(E @ (E.T @ weights))
 
     def material_change(
         self, constant: str, U: np.ndarray, force: np.ndarray
@@ -225,15 +236,17 @@ class ElasticBody(Body):
         return np.asarray(F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0)))
 
     def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        body, table = self.body, self.body.unknowns
-        F = body.A @ U - body.load - force
-        found = {}
-        for name, unknowns in body.holders.items():
+        F, found = self.body.A @ U - self.body.load - force, {}
+        for name, unknowns in self.body.holders.items():
             own = np.zeros(len(F))
             own[unknowns] = F[unknowns]
-            acting = np.flatnonzero(own[table].any(axis=0))
-            found[name] = body.locations[:, acting], own[table[:, acting]]
+            found[name] = self.acting(own)
         return found
+
+    def acting(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        nodal = force[self.body.unknowns]
+        nodes = np.flatnonzero(nodal.any(axis=0))
+        return self.body.locations[:, nodes], nodal[:, nodes]
 
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
@@ -295,8 +308,11 @@ def condense(
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
     own = np.sum(body.motion * (whole @ body.motion), axis=0)
     moves = stiffness <= KERNEL * np.max(own, initial=0.0)
-    # keep one multiplier per plate component
-    free = np.eye(len(K)) if moves.all() else vectors[:, moves]
+    # one multiplier per plate component that moves freely, whatever the others do
+    free = vectors[:, moves]
+    leading = np.sort(la.qr(free.T, pivoting=True, mode="r")[1][: free.shape[1]])
+    free = np.asarray(free @ np.linalg.inv(free[leading]))
+    free[leading] = np.eye(len(leading))
     modes = free, vectors[:, ~moves] / np.sqrt(stiffness[~moves])
     relief, load = _relief(body, made, kept), body.plate_forces
     parts = (body, made, kept, interface, body.prescribed, relief, extended, modes, load, ground)

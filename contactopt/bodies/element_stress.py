@@ -7,12 +7,13 @@ import skfem
 
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.elements import weight_at
-from contactopt.bodies.fields import PLACES, STRESSES, Fields, Validity, von_mises
-from contactopt.material import lame
+from contactopt.bodies.fields import PLACES, Fields, Validity, von_mises
 from contactopt.meshes.cells import SHAPES, second_order, straight
+from contactopt.scenes.kinds import Kind
 
 # elements whose shape functions are evaluated at a time, which bounds the memory that they take
 BLOCK = 2000
+ROUNDING = 1e-12  # share of |A| |U| below which internal forces A U are rounding
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
@@ -22,19 +23,23 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
     internal = body.A @ U
     missing = internal - body.load - force
     plates = body.motion.T @ missing - body.plate_forces
-    sizes = (
-        np.abs(part).sum()
-        for part in (force, body.load, body.plate_forces, np.delete(internal, body.free))
-    )
-    size = max(sizes)
+    applied = max(np.abs(part).sum() for part in (force, body.load, body.plate_forces))
+    size = max(applied, np.abs(np.delete(internal, body.free)).sum())
     unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
+    if applied == 0 and size <= ROUNDING * float((abs(body.A) @ np.abs(U)).sum()):
+        unbalanced = 0.0  # supports move the body as a whole: all forces are rounding
     gradient = _middle_gradient(body.basis, U)
     turned = gradient.swapaxes(1, 2)
-    strain = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(initial=0.0)
+    strains = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(axis=1)
+    mean = np.sqrt(np.average(strains**2, weights=np.sum(body.basis.dx, axis=1)))
     rotation = np.linalg.norm(gradient - turned, axis=(1, 2)).max(initial=0.0) / np.sqrt(8)
     moved = float(np.abs(U).max(initial=0.0))
     return Validity(
-        unbalanced / size if size > 0 else unbalanced, float(strain), float(rotation), moved
+        unbalanced / size if size > 0 else unbalanced,
+        float(strains.max()),
+        float(rotation),
+        moved,
+        float(mean),
     )
 
 
@@ -53,7 +58,7 @@ def fields_of(body: Assembly, U: np.ndarray) -> Fields:
     stress = nodal_stress(body, U)
     full = np.stack([stress[i, j] for i, j in PLACES[len(body.unknowns)]], axis=1)
     mesh = straight(basis.mesh) if body.degree == 1 else second_order(basis.mesh, body.locations)
-    return Fields(body.name, mesh, STRESSES[body.kind], U[body.unknowns], full, von_mises(full))
+    return Fields(body.name, mesh, body.kind.stresses, U[body.unknowns], full, von_mises(full))
 
 
 def nodal_stress(
@@ -162,11 +167,11 @@ def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarr
         r = np.asarray(basis.global_coordinates())[0]
         away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
         hoop = np.divide(np.asarray(field)[0], r, where=away, out=limit)
-    return stress_of(lame(body.material), gradient, hoop)
+    return stress_of(body.kind, body.kind.constants(body.material), gradient, hoop)
 
 
 def stress_of(
-    constants: tuple[float, float], gradient: np.ndarray, hoop: np.ndarray | None
+    kind: Kind, constants: tuple[float, float], gradient: np.ndarray, hoop: np.ndarray | None
 ) -> np.ndarray:
     """Stress (3, 3, e, q) of a gradient (dim, dim, e, q) and of a hoop strain, if there is one."""
     lam, shear = constants
@@ -175,4 +180,5 @@ def stress_of(
     strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
     if hoop is not None:
         strain[2, 2] = hoop
-    return np.asarray(2 * shear * strain + lam * np.trace(strain) * np.eye(3)[:, :, None, None])
+    pressed = np.diag([1.0, 1.0, 0.0 if kind.stretches else 1.0])[:, :, None, None]
+    return np.asarray(2 * shear * strain + lam * np.trace(strain) * pressed)

@@ -50,11 +50,11 @@ FACES = {
     "RefTet": (*_TRIANGLE, np.array([[0, 1, 2]])),
     "RefHex": (*_SQUARE, np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])),
 }
-# cells whose nodes are all those of a quadratic face: a tied surface must leave no node of it
-# behind
+# cells whose nodes are all those of a quadratic face: a surface that is tied, or that of a thin
+# body, must leave no node of it behind
 TIED = {
     "RefTri": FACES["RefQuad"][3],
-    "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]),
+    "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]]),
 }
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
 NOISE = 1e-14  # what rounding leaves of a zero
@@ -63,11 +63,13 @@ NOISE = 1e-14  # what rounding leaves of a zero
 class Trace(NamedTuple):
     """The displacement on the contact surface, as in the head of this module.
 
-    nodes    (k,) contact nodes of the body
+    nodes    (k,) contact nodes of the body; one at a corner is named once for each side
     areas    (k,) nodal areas, the integrals of the hat functions
     normals  (dim, k) outward unit normals there, averaged over the facets
     weights  (k, nodes of the body) the matrix W
     cells    (v, c) contacts, as places in `nodes`, at the corners of the linear cells
+    faces    (f, j) copies of nodes on each face: corners, edges, centre
+    copies   (m,) node of the body of each copy (contactopt.bodies.corners)
     """
 
     nodes: np.ndarray
@@ -75,6 +77,8 @@ class Trace(NamedTuple):
     normals: np.ndarray
     weights: sp.csr_matrix
     cells: np.ndarray
+    faces: np.ndarray
+    copies: np.ndarray
 
 
 def weight_at(weight: Weight, x: np.ndarray) -> np.ndarray | float:
@@ -168,23 +172,31 @@ def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:
 
 
 def contact_trace(
-    basis: skfem.CellBasis, degree: int, boundary: np.ndarray, weight: Weight, tied: bool = False
+    basis: skfem.CellBasis,
+    degree: int,
+    boundary: np.ndarray,
+    weight: Weight,
+    every: bool = False,
+    copied: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Trace:
     """The trace of the displacement on a boundary of facets (f,), with the measure `weight`. If
-    `tied`, every node of the boundary is a contact, as where it is tied to another body.
+    `every`, every node of the boundary is a contact, as where it is tied to another body, or thin.
+    Nodes at corners are `copied` (contactopt.bodies.corners.copies).
     """
     name = basis.mesh.refdom.__name__
     places, cells = FACES[name][2:]
     if degree == 1:
         cells = np.arange(cells.shape[1])[None]  # the whole face
         places = places[:, cells[0]]
-    elif tied:
+    elif every:
         cells = TIED.get(name, cells)
     # Values phi_v of the hat functions at the quadrature points of a cell, N_j of the shape
     # functions at all of them.
     phi, points, share = _cell_rule(name, places, cells, degree)
     at = Faces(basis.mesh, boundary, points)
     local, node = _numbered(basis, Faces(basis.mesh, boundary, places))
+    faces, copies = copied or np.unique(node, return_inverse=True)[::-1]
+    faces = faces.reshape(node.shape[0], -1)
     N = np.take_along_axis(at.values(basis.elem.elem), local[:, :, None], axis=1)
     split = (len(boundary), len(cells), phi.shape[1])  # face, cell, point
     flat = at.scale * share
@@ -199,7 +211,7 @@ def contact_trace(
     # Normals are averaged with the hat functions, and areas summed, over the cells that meet in a
     # contact.
     normal = np.einsum("vq,dfcq->dfcv", phi, (at.normals * flat).reshape(-1, *split))
-    nodes, rows = np.unique(node[:, cells], return_inverse=True)
+    contacts, rows = np.unique(faces[:, cells], return_inverse=True)
     rows = rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel())
     normals = np.stack([np.bincount(rows.ravel(), n.ravel()) for n in normal])
@@ -208,12 +220,13 @@ def contact_trace(
     value, row, column = np.broadcast_arrays(
         dual / areas[rows][..., None], rows[..., None], node[:, None, None, :]
     )
-    size = len(nodes), node_unknowns(basis).shape[1]
+    size = len(contacts), node_unknowns(basis).shape[1]
     W = sp.csr_matrix((value.ravel(), (row.ravel(), column.ravel())), size)
     W.data = _clean(W.data)
     W.eliminate_zeros()
     corners = rows.reshape(-1, rows.shape[2]).T
-    return Trace(nodes, areas, _clean(normals), W, corners)  # exact axes stay exact
+    # exact axes stay exact
+    return Trace(copies[contacts], areas, _clean(normals), W, corners, faces, copies)
 
 
 def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:
@@ -224,14 +237,11 @@ def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.nd
     return _numbered(basis, Faces(basis.mesh, boundary, places))[1]
 
 
-def face_nodes(
-    basis: skfem.CellBasis, degree: int, boundary: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The same, and the mean outward normals (dim, f)."""
+def mean_normals(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:
+    """The mean outward normals (dim, f) of the faces of a boundary."""
     _, hat, places, _ = FACES[basis.mesh.refdom.__name__]
     places = places if degree == 2 else places[:, : hat.doflocs.shape[0]]
-    normals = Faces(basis.mesh, boundary, places).normals
-    return nodes_on(basis, degree, boundary), normals.mean(axis=2)
+    return np.asarray(Faces(basis.mesh, boundary, places).normals.mean(axis=2))
 
 
 def _cell_rule(

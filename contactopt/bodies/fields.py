@@ -9,11 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-STRESSES = {
-    "plane-strain": ("xx", "yy", "zz", "xy"),
-    "axisymmetric": ("rr", "zz", "tt", "rz"),
-    "solid": ("xx", "yy", "zz", "xy", "yz", "xz"),
-}
 PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
 
 
@@ -43,10 +38,6 @@ class Fields:
 
         Cells of second order are VTK's quadratic triangles and tetrahedra, biquadratic
         quadrilaterals and triquadratic hexahedra (22, 24, 28 and 29).
-
-        Parameters
-        ----------
-        path : The file.
         """
         import meshio
 
@@ -80,12 +71,14 @@ class Validity(NamedTuple):
     strain     largest principal strain, and rotation  largest rotation [rad], in the middle of an
                element
     moved      largest displacement [length]
+    mean_strain  root mean square of the largest principal strains over the body
     """
 
     imbalance: float = 0.0
     strain: float = 0.0
     rotation: float = 0.0
     moved: float = 0.0
+    mean_strain: float = 0.0
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

@@ -63,6 +63,10 @@ class HalfSpaceBody(UndividedBody):
         return int(np.prod(self.grid)) * len(self.components)
 
     @property
+    def whole(self) -> range:  # type: ignore[override]
+        return range(2 * self.unknowns, 2 * self.unknowns + len(self.components))
+
+    @property
     def cell(self) -> float:
         """Area of a cell [length^2]."""
         return float(np.prod(self.spacing)) * self.thickness
@@ -277,7 +281,7 @@ def assemble_half_space(
     scene: Scene, part: HalfSpace, elements: int, zone: float | None
 ) -> HalfSpaceBody:
     """A half-space on its grid; InputError in an axisymmetric or mirrored scene."""
-    if scene.kind == "axisymmetric" or scene.copies > 1:
+    if scene.analysis.revolved or scene.analysis.stretches or scene.copies > 1:
         raise InputError(
             f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with"
             " copies = 1, because the forces between its points know no symmetry."

@@ -31,6 +31,7 @@ from skfem.helpers import dot
 
 from contactopt.bodies.elements import Weight, node_unknowns, weight_at
 from contactopt.errors import InputError
+from contactopt.scenes.kinds import Kind
 
 # mean square of a motion (largest displacement one) over the held unknowns below which nothing
 # holds it
@@ -73,13 +74,11 @@ def _planes(dim: int) -> list[tuple[int, int]]:
     return [(i, j) for i in range(dim) for j in range(i)]
 
 
-def free_motions(
-    kind: str, components: tuple[str, ...], basis: skfem.CellBasis, held: np.ndarray, weight: Weight
-) -> Motions:
+def free_motions(kind: Kind, basis: skfem.CellBasis, held: np.ndarray, weight: Weight) -> Motions:
     """The rigid motions of a body that leave all held unknowns (n,) at rest, with inertia by the
     measure `weight`; where axisymmetric, the one along the axis.
     """
-    R, labels = whole_motions(kind, components, basis)
+    R, labels = whole_motions(kind, basis)
     combined, names = kernel(R[held], labels)
     Z = R @ combined
     Z[held] = 0.0
@@ -92,17 +91,15 @@ def free_motions(
     return Motions(Z, names, np.sort(fixing), inertia @ np.linalg.inv(Z.T @ inertia))
 
 
-def whole_motions(
-    kind: str, components: tuple[str, ...], basis: skfem.CellBasis
-) -> tuple[np.ndarray, tuple[str, ...]]:
+def whole_motions(kind: Kind, basis: skfem.CellBasis) -> tuple[np.ndarray, tuple[str, ...]]:
     """All rigid motions of a body (n, m) as if nothing held it, and what each of them is."""
-    unknowns = node_unknowns(basis)
+    unknowns, components = node_unknowns(basis), kind.components
     x = basis.doflocs[:, unknowns[0]]
     labels = [f"translation along {component}" for component in components]
     labels += [f"rotation in the {components[j]}-{components[i]} plane" for i, j in _planes(len(x))]
     R = np.zeros((basis.N, len(labels)))
     R[unknowns] = rigid_fields(x)
-    one = slice(1, 2) if kind == "axisymmetric" else slice(None)
+    one = slice(1, 2) if kind.revolved else slice(None)
     return R[:, one], tuple(labels[one])
 
 

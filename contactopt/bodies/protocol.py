@@ -125,6 +125,16 @@ class Body(ABC):
         more than load values differ.
         """
 
+    @abstractmethod
+    def carried(self, component: int) -> tuple[np.ndarray, np.ndarray]:
+        """Weights w (n,) of the displacements whose sum w' U is the motion of the body along a
+        component, read where plates or supports move it, and C w (n,).
+        """
+
+    def plates(self, U: np.ndarray) -> dict[str, float]:
+        """How far each plate moves [length], by names as in `motion_names`."""
+        return {}
+
     def material_change(
         self, constant: str, U: np.ndarray, force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -170,6 +180,12 @@ class Body(ABC):
         """
         return {}
 
+    def acting(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Where forces on the unknowns act: positions (dim, m) of nodes [length] and the forces
+        (dim, m) there [force]; None for a body without nodes.
+        """
+        return None
+
     def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
         """For each of other displacements (n,) the products (elements,) of its stress errors with
         those of U [force length] (contactopt.bodies.element_stress); (0,) for a body without
@@ -204,9 +220,7 @@ class Body(ABC):
         return None
 
     def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
-        """How far the body is from equilibrium, strained and turned; zeros without equations of its
-        own.
-        """
+        """How far it is from equilibrium, strained and turned; zeros without own equations."""
         return Validity()
 
     def grounded(self, modulus: float) -> Body:
@@ -217,7 +231,5 @@ class Body(ABC):
         return self
 
     def pulled(self, U: np.ndarray) -> Body:
-        """The body with its ground pulling it towards a displacement; its own self without a
-        ground.
-        """
+        """The body with its ground pulling it towards a displacement; itself without a ground."""
         return self

@@ -36,6 +36,10 @@ class RigidBody(UndividedBody):
     unknowns = 0
     meshed = False
 
+    @property
+    def whole(self) -> range:  # type: ignore[override]
+        return range(len(self.components))
+
     @cached_property
     def at_rest(self) -> np.ndarray:
         return np.concatenate([self.given, 0 * self.given])
@@ -43,6 +47,11 @@ class RigidBody(UndividedBody):
     @cached_property
     def motions(self) -> np.ndarray:
         return np.concatenate([self.shifts, 0 * self.shifts])
+
+    @property
+    def held(self) -> np.ndarray:
+        free = self.part.force or {}
+        return np.array([i for i, c in enumerate(self.components) if c not in free], dtype=int)
 
     def surface(self, name: str | None = None) -> Surface:
         raise InputError(

@@ -41,7 +41,6 @@ from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.element_stress import stress_of
 from contactopt.bodies.fields import PLACES, Region
 from contactopt.errors import InputError
-from contactopt.material import lame, lame_by_poisson
 from contactopt.meshes.cells import straight
 from contactopt.meshes.structured import simplices
 
@@ -79,7 +78,7 @@ class StressMap:
 
     def stress(self, U: np.ndarray) -> np.ndarray:
         """The recovered stress (m, 4 or 6) at every place under a displacement U (n,), components
-        as in contactopt.bodies.fields.STRESSES.
+        as in contactopt.scenes.kinds.
         """
         return (
             np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
@@ -133,7 +132,7 @@ class StressMap:
         for number in range(basis.Nbfun):
             field = basis.basis[number][0]
             hoop = None if radius is None else np.asarray(field)[0] / radius
-            stress = stress_of(self.constants, np.asarray(field.grad), hoop)
+            stress = stress_of(self.body.kind, self.constants, np.asarray(field.grad), hoop)
             for own, (i, j) in zip(entries, places):
                 own.append(stress[i, j])
         row = np.tile(np.arange(shape[0]), basis.Nbfun)
@@ -167,7 +166,8 @@ def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> Stre
     row = np.repeat(row, count)
     at = np.asarray(basis.global_coordinates()).reshape(len(mesh.p), -1)
     fit = _fit(*_both_sides(at[:, points] - places[:, row], row, points, in_plane), steep, terms)
-    constants = lame_by_poisson(body.material) if by_poisson else lame(body.material)
+    kind = body.kind
+    constants = (kind.constants_by_poisson if by_poisson else kind.constants)(body.material)
     mirrored = np.concatenate([in_plane, np.zeros((3 - len(in_plane), len(sources)), dtype=bool)])
     even = np.stack([~(mirrored[i] ^ mirrored[j]) for i, j in PLACES[len(mesh.p)]], axis=1).astype(
         float
@@ -178,9 +178,7 @@ def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> Stre
 def _both_sides(
     offset: np.ndarray, row: np.ndarray, column: np.ndarray, in_plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of patches with their mirror images across the planes (dim, m) in which their places
-    lie.
-    """
+    """Points of patches with their mirror images in the planes (dim, m) through their places."""
     for axis, there in enumerate(in_plane):
         images = np.flatnonzero(there[row])
         other = offset[:, images].copy()

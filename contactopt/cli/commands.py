@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.cards import count
-from contactopt.cli.test_set import problems  # noqa: F401 (a command, too)
+from contactopt.checks import overheard
 from contactopt.errors import InputError
-from contactopt.outcome import summary_rows
+from contactopt.files.toml_table import parse
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -27,7 +27,7 @@ def _arguments_of(texts: list[str]) -> dict[str, Any]:
         if not sign or not name:
             raise InputError(f"--set needs NAME=VALUE, as in --set width=30; got {text!r}.")
         try:
-            found[name] = tomllib.loads(f"value = {value}")["value"]
+            found[name] = parse(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:
             found[name] = value
     return found
@@ -43,75 +43,40 @@ def _changes(options: argparse.Namespace) -> dict[str, Any]:
     return changes | given
 
 
-def scene_asked(options: argparse.Namespace) -> Any:
-    """Make the scene of the command `run`.
-
-    Parameters
-    ----------
-    options : of the command
-
-    Returns
-    -------
-    Scene : of a load path its last state
-    """
-    from contactopt.runner import scene_of
-
-    return scene_of(options.scene, **_changes(options))
-
-
 def run(options: argparse.Namespace) -> int:
-    """Solve a scene, write its files and print its numbers.
-
-    Parameters
-    ----------
-    options : of the command `run`
-
-    Returns
-    -------
-    int : the exit code, 0 if it is solved, to the accuracy asked for, else 1
+    """Solve a scene, write its files and print its numbers. The exit code is 0 if it is solved, to
+    the accuracy asked for, else 1.
     """
     from contactopt.run_options import OPTIONS
     from contactopt.runner import run
+    from contactopt.screen import progress
 
     out = options.out or f"out/{Path(options.scene).stem}"
     silent = options.quiet or options.json
-    result = run(
-        options.scene,
-        out,
-        note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
-        team=options.team,
-        **{name: getattr(options, name) for name in OPTIONS},
-        **_changes(options),
-    )
+    given = {name: getattr(options, name) for name in OPTIONS} | _changes(options)
+    with progress(Path(options.scene).stem, quiet=silent, lines=options.verbose > 0) as shown:
+        result = run(options.scene, out, note=shown.note, **given)
     if options.json:
         print(json.dumps(result.summary, indent=2))
     else:
         _print_result(result, out)
-        if options.team is not None:
-            sent = options.team.traffic
-            print(f"{options.team.size} ranks, {sent.messages} messages, {sent.length} bytes")
     reached = result.estimate is None or result.estimate.reached
     return 0 if result.solution.solved and reached else 1
 
 
 def _print_result(result: Any, out: str) -> None:
+    from contactopt.figures.output import SINGLE
+    from contactopt.outcome import pair_rows, remark_rows, summary_rows, time_words
+    from contactopt.screen import in_tables
+
     s = result.summary
-    print(s["scene"])
-    for name, words in summary_rows(s).items():
-        print(f"{name}: {words}")
-    for name, found in s.get("quantities", {}).items():
-        error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
-        print(f"{name} {found['value']:.6g}; its relative error on this mesh: {error}")
-    for remark in s["remarks"]:
-        print(f"note: {remark}")
+    print(in_tables(s["scene"], pair_rows(s), summary_rows(s) | remark_rows(s)))
     if (estimate := result.estimate) is not None:
-        print(estimate.guarantee.sentence)
+        if estimate.guarantee is not None:
+            print(estimate.guarantee.sentence)
         for one in estimate.levels:
             print(f"  {one.mesh}: {one.unknowns} unknowns, {one.value:.6g}, {one.seconds:.2f} s")
-    phases = ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
-    print(f"{s['seconds']['total']:.1f} s: {phases}")
-    from contactopt.figures.output import SINGLE
-
+    print(time_words(s))
     names = sorted(file.name for file in Path(out).iterdir())
     single = [name for name in names if SINGLE.search(name)]
     listed = ", ".join(name for name in names if name not in single)
@@ -183,8 +148,9 @@ def check(options: argparse.Namespace) -> int:
     from contactopt.figures.scene_check import check_scene
     from contactopt.runner import states_of
 
-    states, solve = states_of(options.scene, **_arguments_of(options.set))
-    found = check_scene(states, solve)
+    with overheard() as told:
+        states, solve = states_of(options.scene, **_arguments_of(options.set))
+    found = check_scene(states, solve, told)
     print(found.text)
     if options.no_page:
         return 0
@@ -288,26 +254,16 @@ def report(options: argparse.Namespace) -> int:
 
 def list_names(options: argparse.Namespace) -> int:
     """Print everything that can be chosen by its name."""
-    from contactopt.bodies.solvers import SOLVERS
-    from contactopt.linear.operators import FORMS
-    from contactopt.methods import METHODS
+    from contactopt.cli.completion import NAMES
     from contactopt.methods.backends import CONIC, QP
-    from contactopt.methods.preconditioners import PRECONDITIONERS
-    from contactopt.problem.laws import LAWS
-    from contactopt.scenes import PATHS, SCENES
-    from contactopt.scenes.material_library import library
 
-    print("scenes")
-    for name, (_, _, what, *_) in SCENES.items():
-        print(f"  {name:26} {what}" + (" (load path)" if name in PATHS else ""))
-    print("materials of scene files")
-    for name, made in library().items():
-        print(f"  {name:20} E = {made.E:g} {made.stress}, nu = {made.nu:g}: {made.source}")
-    _print_table("laws of contact", LAWS)
-    _print_table("methods", METHODS)
-    print("forms of the interface operator Q: " + ", ".join(FORMS))
-    print("solvers of the bodies: auto, " + ", ".join(SOLVERS))
-    _print_table("preconditioners of the interface operator", PRECONDITIONERS)
+    _print_names("scenes", NAMES["scene"])
+    _print_names("materials of scene files", NAMES["material"])
+    _print_names("laws of contact", NAMES["law"])
+    _print_names("methods", NAMES["method"])
+    print("forms of the interface operator Q: " + ", ".join(NAMES["Q"]))
+    print("solvers of the bodies: " + ", ".join(NAMES["solver"]))
+    _print_names("preconditioners of the interface operator", NAMES["preconditioner"])
     for title, backends in (
         ("QP backends (normal; tangential in 2D)", QP),
         ("conic backends (tangential in 3D)", CONIC),
@@ -319,10 +275,12 @@ def list_names(options: argparse.Namespace) -> int:
     return 0
 
 
-def _print_table(title: str, table: Mapping[str, tuple[str, str, str]]) -> None:
+def _print_names(title: str, names: Mapping[str, str]) -> None:
     print(title)
-    for name, (_, _, what) in table.items():
-        print(f"  {name:20} {what}")
+    wide = max(map(len, names))
+    for name, what in names.items():
+        if what:
+            print(f"  {name:{wide}} {what}")
 
 
 def completion(options: argparse.Namespace) -> int:

@@ -10,7 +10,6 @@ from typing import Any
 
 import contactopt
 from contactopt.benchmark.keys import help_text
-from contactopt.cli import commands
 from contactopt.cli.completion import NAMES
 from contactopt.run_options import OPTIONS
 
@@ -18,11 +17,8 @@ OF_A_SCENE = ("run", "show", "check", "simplify", "export")
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Build the parser of the command line, with all commands and options.
-
-    Returns
-    -------
-    ArgumentParser : what it reads has the function to execute in its attribute `command`
+    """The parser of the command line, with all commands and options; the attribute `command` of
+    what it reads names the function to execute.
     """
     texts = tomllib.loads(files("contactopt.cli").joinpath("command_line.toml").read_text("utf-8"))
     texts["commands"]["bench"]["epilog"] = help_text()
@@ -49,7 +45,7 @@ def make_parser() -> argparse.ArgumentParser:
             # an epilog of several paragraphs keeps its lines
             formatter_class=plain if "\n\n" in (epilog or "") else argparse.HelpFormatter,
         )
-        made.set_defaults(command=getattr(commands, command.get("function", name)), parser=parser)
+        made.set_defaults(command=command.get("function", name), parser=parser)
         arguments = texts["scene"] if name in OF_A_SCENE else {}
         _add(made, arguments | command.get("arguments", {}) | (_of_run() if name == "run" else {}))
     return parser
@@ -88,7 +84,7 @@ def _of_run() -> dict[str, dict[str, Any]]:
         if option.kind is tuple:
             told |= {"nargs": "+", "type": str}
         if name == "figures":
-            told |= {"choices": NAMES[name], "group": "pictures"}
+            told |= {"choices": [*NAMES[name]], "group": "pictures"}
             none = {"dest": name, "action": "store_const", "const": (), "group": "pictures"}
             made["--no-figures"] = none | {"help": "draw no figures"}
     return made

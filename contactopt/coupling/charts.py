@@ -22,7 +22,7 @@ RANK = 1e-6
 
 
 def lay_out(
-    contacts: ContactPoints, copies: int, axisymmetric: bool
+    contacts: ContactPoints, copies: int, revolved: bool
 ) -> tuple[Chart, np.ndarray, np.ndarray]:
     """Lay out the chart and the local frames of a contact surface.
 
@@ -33,7 +33,7 @@ def lay_out(
     chart and the frames (k, dim, dim) of the contacts in their new order, and this order (k,).
     """
     planes, mirrors = symmetry_planes(contacts), copies > 1
-    if axisymmetric and contacts.points[0].min() <= NEAR * contacts.size:
+    if revolved and contacts.points[0].min() <= NEAR * contacts.size:
         planes, mirrors = [SymmetryPlane(np.array([1.0, 0.0]), 0.0)], True
     period = None
     if len(contacts.points) == 2:

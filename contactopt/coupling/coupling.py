@@ -15,13 +15,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody
+from contactopt.coupling.patch_test import misfit
 from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
@@ -65,6 +66,9 @@ class Coupling:
     carrier       'upper' or 'lower': the side whose nodes carry the contacts
     share         (k,) part of the faces around each contact that the areas cover: less than one
                   where the other surface ends; None: all of them
+    conforming    whether the facets of both sides have the same contacts at their corners
+    why           why surfaces are coupled in this way; empty where this way was asked for
+    remarks       sentences for the reader on what this coupling cannot do well
     """
 
     upper: sp.csr_matrix
@@ -79,6 +83,9 @@ class Coupling:
     kind: str = "matching"
     carrier: str = "lower"
     share: np.ndarray | None = None
+    conforming: bool = False
+    why: str = ""
+    remarks: tuple[str, ...] = ()
 
 
 def couple(
@@ -87,21 +94,48 @@ def couple(
     """Make the coupling of a pair of surfaces of two assembled bodies.
 
     `kind` is a name in COUPLINGS or 'auto', by default that of the pair. 'auto' is matching nodes
-    where they match, or where a body has no mesh, and otherwise mortar. InputError for an unknown
-    kind, and for surfaces that this kind cannot couple.
+    where they match and pass the patch test (contactopt.coupling.patch_test), or where a body has
+    no mesh, and otherwise mortar. InputError for an unknown kind, and for surfaces that this kind
+    cannot couple.
     """
     kind = kind or pair.coupling
-    if kind != "auto":
-        return _kind(kind)(scene, pair, upper, lower)
-    meshed = upper.meshed and lower.meshed
-    if pair.carrier is None or not meshed:
+    ways, why = [kind], "the scene asks for it"
+    if kind == "auto":
+        meshed, free = upper.meshed and lower.meshed, pair.carrier is None
+        ways = ["matching", "mortar"] if meshed and free else ["mortar" if meshed else "matching"]
+        why = "nodes and facets match" if free else "the contact names the side that carries it"
+    for way in ways:
         try:
-            return _kind("matching")(scene, pair, upper, lower)
+            made = tested(_kind(way)(scene, pair, upper, lower), pair, (upper, lower))
         except InputError as error:
-            if not meshed:
+            if way == ways[-1]:
                 raise
-            log.info("contact '%s' is coupled by mortar: %s", pair.name, error)
-    return _kind("mortar")(scene, pair, upper, lower)
+            why = str(error).partition(";")[0]
+        else:
+            if way == ways[-1] or not made.remarks:
+                break
+            why = f"the nodes match, but {made.remarks[0].partition(': ')[2]}"
+    if made.kind != ways[0]:
+        log.info("contact '%s' is coupled by %s: %s", pair.name, made.kind, why)
+    return replace(made, why=why)
+
+
+def tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, AssembledBody]) -> Coupling:
+    """The contract of every coupling: a constant pressure gives both sides their consistent nodal
+    forces. Where it does not, a remark says so.
+    """
+    surfaces = tuple(
+        body.surface(name) if body.meshed else None for body, name in zip(bodies, pair.surfaces)
+    )
+    if (found := misfit(made, surfaces)) is None:
+        return made
+    where = ", ".join(f"{c:.4g}" for c in found.place)
+    said = (
+        f"contact '{pair.name}', coupled by {made.kind}: a constant pressure gives body"
+        f" '{bodies[found.side].name}' wrong forces, by {found.error:.2g} of a node's near"
+        f" ({where})"
+    )
+    return replace(made, remarks=(*made.remarks, said))
 
 
 def _kind(name: str) -> Callable[..., Coupling]:

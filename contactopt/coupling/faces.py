@@ -46,6 +46,7 @@ class Faces:
             the faces are it
     mirror  (dim, n) components across planes of symmetry that nodes lie in: what is modelled is
             half of what is there; None: there is no such plane
+    every   whether all nodes of quadratic faces are vertices of linear cells
     """
 
     name: str
@@ -57,6 +58,7 @@ class Faces:
     weight: tuple[float, bool] = (1.0, False)
     curve: Callable[[np.ndarray], np.ndarray] | None = None
     mirror: np.ndarray | None = None
+    every: bool = False
 
     @property
     def dim(self) -> int:
@@ -76,7 +78,8 @@ class Faces:
         """(c, v) nodes of a face that are the vertices of its linear cells."""
         if self.degree == 1:
             return np.arange(self.corners)[None]
-        return np.asarray(FACES[self.kind][3])
+        plain = FACES[self.kind][3]
+        return np.asarray(TIED.get(self.kind, plain) if self.every else plain)
 
     def cell_nodes(self) -> np.ndarray:
         """(f c, v) nodes of the body that are the vertices of all linear cells."""
@@ -109,8 +112,10 @@ class Faces:
     def local(self, cell: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Coordinates (dim - 1, m) on linear cells (m,), 0 to 1, of places `at` on the face."""
         first = self.places[:, self.cells[:, 0]]
-        width = self.places[:, self.cells[:, [1, -1]]].max(axis=2) - first
-        return np.asarray((at - first[:, cell]) / np.where(width > 0, width, 1.0)[:, cell])
+        # the cells lie along the axes: the first edge along one, the last along the other
+        ends = self.cells[:, [1, -1]][:, : len(first)]
+        width = np.stack([self.places[d, end] - first[d] for d, end in enumerate(ends.T)])
+        return np.asarray((at - first[:, cell]) / width[:, cell])
 
     def hats(self, local: np.ndarray) -> np.ndarray:
         """(v, m) hat functions of a linear cell at coordinates (dim - 1, m) on it."""
@@ -216,7 +221,7 @@ def patches(surface: Faces, own: bool) -> tuple[np.ndarray, np.ndarray]:
     nodes, and their linear cell (p,), over which they never reach where the side is `own`.
     """
     if surface.curved and surface.kind == "RefTet":
-        return TIED["RefTet"], np.zeros(4, dtype=int)
+        return TIED["RefTet"], np.arange(4) % len(surface.cells)
     if own or surface.curved:
         return surface.cells, np.arange(len(surface.cells))
     return np.arange(surface.corners)[None], np.zeros(1, dtype=int)

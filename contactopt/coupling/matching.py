@@ -6,12 +6,14 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody, Surface
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes
+from contactopt.coupling.segments import FACING
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
@@ -33,29 +35,24 @@ def couple_nodes(
     scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody
 ) -> Coupling:
     """The coupling whose contacts are the contact nodes of the lower body, or of the upper one if
-    that alone has a mesh.
+    that alone has a mesh. InputError if the contact nodes of two bodies do not match.
 
     Frames and areas are those of the body that the contacts belong to. The contacts are numbered
     along the chart.
-
-    Parameters
-    ----------
-    scene, pair : The kind of the scene, and the pair of surfaces.
-    upper, lower : The two bodies, of which at least one has a mesh.
-
-    Returns
-    -------
-    One contact for each pair of nodes. InputError if the contact nodes of two bodies do not match.
     """
-    names = pair.surfaces
+    names, conforming = pair.surfaces, True
     if upper.meshed and lower.meshed:
         first, second = upper.surface(names[0]), lower.surface(names[1])
         lead, partner = second, _match(first, second)
         normals, gap = lead.normals, 0 * lead.areas
+        conforming = _conforming(lead.cells, first.cells, partner)
     else:
         lead = upper.surface(names[0]) if upper.meshed else lower.surface(names[1])
-        follower, outward = (lower, -lead.normals) if upper.meshed else (upper, lead.normals)
-        other, gap = follower.facing(lead, outward)
+        follower, sign = (lower, -1.0) if upper.meshed else (upper, 1.0)
+        other, gap = follower.facing(lead, sign * lead.normals)
+        if (one := _without_copies(lead, sign * other.normals)) is not lead:
+            lead = one
+            other, gap = follower.facing(lead, sign * lead.normals)
         first, second = (lead, other) if upper.meshed else (other, lead)
         partner, normals = np.arange(len(gap)), other.normals
     held = first.held[:, partner] & second.held
@@ -67,7 +64,49 @@ def couple_nodes(
     _, frames, order = laid_out = _laid_out(scene, lead, points)
     theirs = local_map(first.traces, partner[order], frames)
     maps = theirs, local_map(second.traces, order, frames)
-    return of_contacts("matching", "lower" if lower.meshed else "upper", points, laid_out, maps)
+    side = "lower" if lower.meshed else "upper"
+    made = of_contacts("matching", side, points, laid_out, maps)
+    return replace(made, conforming=conforming)
+
+
+def _conforming(cells: np.ndarray, others: np.ndarray, partner: np.ndarray) -> bool:
+    """Whether all cells (v, c) of a surface have the partners of their corners at the corners of
+    one of the cells of the other surface.
+    """
+    if len(cells) != len(others):
+        return False
+    known = np.unique(np.sort(others, axis=0), axis=1)
+    both = np.unique(np.concatenate([known, np.sort(partner[cells], axis=0)], axis=1), axis=1)
+    return both.shape[1] == known.shape[1]
+
+
+def _without_copies(surface: Surface, outward: np.ndarray) -> Surface:
+    """The surface with one contact, in place of one for each side, at corners where the other body
+    has one normal for all. Their areas are those of the sides that face it: `outward` (dim, k) is
+    the direction to it.
+    """
+    k = surface.points.shape[1]
+    both = np.concatenate([surface.points, outward])
+    known, first, own = np.unique(both, axis=1, return_index=True, return_inverse=True)
+    if known.shape[1] == k:
+        return surface
+    rank = np.argsort(np.argsort(first))  # the contacts keep their order
+    own, first = rank[own.ravel()], np.sort(first)
+    towards = np.sum(surface.normals * outward, axis=0) > -FACING
+    share = np.where(towards | (np.bincount(own, towards) == 0)[own], surface.areas, 0.0)
+    areas = np.bincount(own, share)
+    M = sp.csr_matrix((share / areas[own], (own, np.arange(k))), (len(first), k))
+    normals = surface.normals @ M.T
+    return replace(
+        surface,
+        points=surface.points[:, first],
+        normals=normals / np.linalg.norm(normals, axis=0),
+        areas=areas,
+        weights=sp.csr_matrix(M @ surface.weights),
+        traces=tuple(sp.csr_matrix(M @ trace) for trace in surface.traces),
+        held=surface.held[:, first],
+        cells=own[surface.cells],
+    )
 
 
 def _laid_out(
@@ -77,7 +116,7 @@ def _laid_out(
     n = points.normals
     along = np.all(np.abs(n) == np.abs(lead.normals)) and np.all(n == n[:, :1])
     if lead.chart is None or not along:
-        return lay_out(points, scene.copies, scene.kind == "axisymmetric")
+        return lay_out(points, scene.copies, scene.analysis.revolved)
     frame = np.roll(np.eye(len(n)), 1, axis=0)  # n, t1, t2 along the last, first, second component
     frame[0] = n[:, 0]
     k = len(points.gap)
@@ -95,11 +134,12 @@ def _match(upper: Surface, lower: Surface) -> np.ndarray:
             f"interface nodes do not match: body '{upper.body}' has {upper.points.shape[1]} contact"
             f" nodes, body '{lower.body}' has {k}; {REMEDY}."
         )
-    if np.array_equal(upper.points, lower.points):
+    facing = np.sum(upper.normals * lower.normals, axis=0)
+    if np.array_equal(upper.points, lower.points) and np.all(facing < 0):
         return np.arange(k)
-    spacing = 1.0
-    if k > 1:
-        spacing = float(KDTree(lower.points.T).query(lower.points.T, k=2)[0][:, 1].min())
+    spacing, apart = 1.0, np.unique(lower.points.T, axis=0)  # nodes at corners are there twice
+    if len(apart) > 1:
+        spacing = float(KDTree(apart).query(apart, k=2)[0][:, 1].min())
     mean = lower.normals @ lower.areas
     mean = mean / max(float(np.linalg.norm(mean)), 1e-300)
     turn = _turn(lower)
@@ -145,8 +185,7 @@ def _along(
     found, ranks = np.full(count, -1), np.arange(1, min(NEAREST, count) + 1)
     for _ in range(STEPS):
         near = tree.query((lower.points + height * direction).T, k=ranks)[1]
-        facing = np.einsum("di,dij->ij", lower.normals, upper.normals[:, near]) < 0
-        before, found = found, near[np.arange(count), np.argmax(facing, axis=1)]
+        before, found = found, near[np.arange(count), _best(upper, lower, near, spacing)]
         height = np.sum((upper.points[:, found] - lower.points) * direction, axis=0)
         if np.array_equal(before, found):
             break
@@ -171,3 +210,14 @@ def _along(
         if np.any(off[some] > allowed[some]):
             break
     return found, off, allowed
+
+
+def _best(upper: Surface, lower: Surface, near: np.ndarray, spacing: float) -> np.ndarray:
+    """Which (k,) of some upper contacts (k, j), the nearest first, is the partner of each lower
+    one: the first that does not face the same way, or one at its place that faces it better.
+    """
+    cosine = np.einsum("di,dij->ij", lower.normals, upper.normals[:, near])
+    row = np.arange(len(near))
+    first = np.argmax(cosine < 0, axis=1)
+    apart = np.linalg.norm(upper.points[:, near] - upper.points[:, near[row, first], None], axis=0)
+    return np.asarray(np.argmin(np.where(apart <= MATCH * spacing, cosine, np.inf), axis=1))

@@ -83,6 +83,7 @@ from contactopt.coupling.mortar_matrices import collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
 from contactopt.errors import InputError
 
+NUDGE = 0.05  # of the way to the centre of a face: about the first point of integration on it
 OVERLAP = 1e-9  # initial overlap, over the extent of the contact surface, that is reported
 
 _log = logging.getLogger(__name__)
@@ -243,6 +244,15 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return normals, area ** (1 / (surface.dim - 1)), full
 
 
+def _centres(surface: Faces) -> np.ndarray:
+    """(dim, n) the mean centres of the faces around all points of a surface; zero elsewhere."""
+    middle = surface.points[:, surface.faces].mean(axis=2)
+    node, j = surface.faces.ravel(), surface.faces.shape[1]
+    count = np.maximum(np.bincount(node, minlength=surface.points.shape[1]), 1)
+    sums = [np.bincount(node, np.repeat(row, j), len(count)) for row in middle]
+    return np.stack(sums) / count
+
+
 def _alone(
     own: Faces, other: Faces, points: Overlap, nodes: np.ndarray, normals: np.ndarray
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
@@ -250,7 +260,10 @@ def _alone(
     k = len(nodes)
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
     x = own.points[:, nodes]
-    near = KDTree(own.locations(points.cell // len(own.cells), points.at)[0].T).query(x.T)[1]
+    # a point on the faces of the node itself: at a corner others are as near
+    inward = NUDGE * (_centres(own)[:, nodes] - x)
+    places = own.locations(points.cell // len(own.cells), points.at)[0]
+    near = KDTree(places.T).query((x + inward).T)[1]
     n, axes = normals[:, nodes].T[:, None], points.axes[near]
     axes = axes - np.sum(axes * n, axis=2, keepdims=True) * n
     there = other.locate(points.face[near], x, axes, points.there[:, near])

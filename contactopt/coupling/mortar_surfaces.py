@@ -12,11 +12,15 @@ from contactopt.bodies.assembled import AssembledBody, Mesh, Surface
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
-from contactopt.coupling.mortar import contact_normals, mortar
+from contactopt.coupling.mortar import Mortar, contact_normals, mortar
 from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
 from contactopt.errors import InputError
+from contactopt.meshes.curves import KINK
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.scene import Scene
+
+# contacts for each node of a thin body, below which displacements of its surface move none of them
+FEWEST = 0.95
 
 log = logging.getLogger(__name__)
 
@@ -25,25 +29,21 @@ def couple_surfaces(
     scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody
 ) -> Coupling:
     """The mortar coupling of two bodies with meshes (contactopt.coupling.mortar), numbered along
-    the chart.
+    the chart: one contact for each node of the carrier that faces the other side. InputError if a
+    body has no mesh there, or if the surfaces face each other nowhere.
 
-    The contacts are carried by the side that the pair names, otherwise by that with more contacts
-    where they face each other.
-
-    Parameters
-    ----------
-    scene, pair : The kind of the scene, and the pair of surfaces.
-    upper, lower : The two bodies.
-
-    Returns
-    -------
-    One contact for each node of the carrier that faces the other side. InputError if a body has no
-    mesh on its contact surface, or if the surfaces face each other nowhere.
+    The contacts are carried by the side that the pair names. Otherwise it is the one with more
+    contacts where they face each other, unless a thin body on the other side has more nodes there
+    than contacts: the thin one carries them then (contactopt.bodies.thickness).
     """
     bodies = upper, lower
     meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]
     sides = _halved([_faces(body.name, mesh) for body, mesh in zip(bodies, meshes)], meshes)
-    m = mortar(sides[0], sides[1], pair.carrier)
+    m, loose = _carried(sides, meshes, pair.carrier)
+    one = _whole_where_even(sides[m.own], m.nodes, m.normals)
+    if one is not sides[m.own]:
+        sides[m.own] = one
+        m, loose = _carried(sides, meshes, SIDES[m.own])
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
     # as well where a plane of symmetry of both cuts it.
@@ -56,7 +56,7 @@ def couple_surfaces(
     cells = number[carrier.cell_nodes()]
     cells = cells[np.all(cells >= 0, axis=1)].T  # those whose corners all carry contacts
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
-    laid_out = lay_out(contacts, scene.copies, scene.kind == "axisymmetric")
+    laid_out = lay_out(contacts, scene.copies, scene.analysis.revolved)
     _, frames, order = laid_out
     maps = []
     for i, mesh in enumerate(meshes):
@@ -68,7 +68,57 @@ def couple_surfaces(
     side = SIDES[m.own]
     said = "contact '%s': mortar, %d contacts on the %s body '%s'"
     log.info(said, pair.name, len(order), side, carrier.name)
-    return of_contacts("mortar", side, contacts, laid_out, (maps[0], maps[1]), m.share)
+    made = of_contacts("mortar", side, contacts, laid_out, (maps[0], maps[1]), m.share)
+    if loose < FEWEST:
+        other = SIDES[1 - m.own]
+        said = (
+            f"contact '{pair.name}': the {other} body '{sides[1 - m.own].name}' is thin and has"
+            f" {loose:.2g} contacts for each of its nodes, so that it can bulge between them; take"
+            f" carrier = '{other}', or a finer mesh of the {side} body."
+        )
+        return replace(made, remarks=(said,))
+    return made
+
+
+def _carried(sides: list[Faces], meshes: list[Mesh], carrier: str | None) -> tuple[Mortar, float]:
+    """The contacts, and how many of them there are for each node of a thin other side."""
+    made = mortar(sides[0], sides[1], carrier)
+    loose = _per_node(made, sides, meshes)
+    if carrier is None and loose < FEWEST:
+        turned = mortar(sides[0], sides[1], SIDES[1 - made.own])
+        if (other := _per_node(turned, sides, meshes)) > loose:
+            return turned, other
+    return made, loose
+
+
+def _per_node(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> float:
+    """The least number of contacts per node, over the thin faces of the side that does not carry
+    them which these cover; 1 without any, and for linear elements, which hardly bend.
+    """
+    other = 1 - made.own
+    if sides[other].degree == 1:
+        return 1.0
+    W, faces = made.weights[other], sides[other].faces[meshes[other].thin]
+    seen = np.diff(W.tocsc().indptr) > 0
+    covered = faces[seen[faces].all(axis=1)]
+    count = np.asarray(W.sum(axis=0)).ravel()[covered].mean(axis=1)
+    return float(count.min(initial=1.0))
+
+
+def _whole_where_even(side: Faces, nodes: np.ndarray, normals: np.ndarray) -> Faces:
+    """The surface that is not cut at a corner where its contacts, at `nodes` (k,), have nearly the
+    same normals (dim, k): a tip on a flat surface has one contact.
+    """
+    points = side.points[:, nodes]
+    _, first, own = np.unique(points, axis=1, return_index=True, return_inverse=True)
+    twin = first[own.ravel()]
+    even = np.sum(normals * normals[:, twin], axis=0) > np.cos(KINK[0])
+    even &= twin != np.arange(len(nodes))
+    if not even.any():
+        return side
+    number = np.arange(side.points.shape[1])
+    number[nodes[even]] = nodes[twin[even]]
+    return replace(side, faces=number[side.faces])
 
 
 def _mesh(surface: Surface) -> Mesh:
@@ -81,7 +131,8 @@ def _mesh(surface: Surface) -> Mesh:
 
 
 def _faces(name: str, m: Mesh) -> Faces:
-    return faces_of(name, m.kind, m.degree, m.faces, m.outward, m.measure, m.locations, m.curve)
+    made = faces_of(name, m.kind, m.degree, m.faces, m.outward, m.measure, m.locations, m.curve)
+    return replace(made, every=bool(m.thin.any()))
 
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:

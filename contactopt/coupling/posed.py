@@ -14,7 +14,9 @@ from contactopt.bodies import assemble
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.protocol import Body
 from contactopt.checks import check_count, check_number
-from contactopt.coupling.coupling import Coupling, couple, law_of
+from contactopt.coupling.coupling import Coupling, couple, law_of, tested
+from contactopt.coupling.crosspoints import independent
+from contactopt.coupling.joined_once import check_once
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane, mirror_planes
 from contactopt.errors import InputError
 from contactopt.linear.concurrency import each
@@ -47,8 +49,13 @@ def posed(
     assembled = tuple(each(lambda part: assemble(scene, part, elements, zone), scene.parts))
     named = {body.name: body for body in assembled}
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
-    pairs = zip(scene.pairs, sides)
-    couplings = tuple(couple(scene, pair, *bodies, coupling) for pair, bodies in pairs)
+    check_once(scene.pairs, sides)
+    named_sides = list(zip(scene.pairs, sides))
+    made = [couple(scene, pair, *bodies, coupling) for pair, bodies in named_sides]
+    couplings = tuple(
+        own if own is old else tested(own, *asked)
+        for own, old, asked in zip(independent(scene.pairs, made, assembled), made, named_sides)
+    )
     maps = tuple(_signed_map(body, sides, couplings) for body in assembled)
     planes: tuple[SymmetryPlane, ...] = ()
     if scene.copies > 1:

@@ -316,7 +316,7 @@ def _way(
     solvers = solvers_there() if solver == "auto" else (solver,)
     unknowns = round(filling(maps) ** 0.5)
     costs = estimates([body.work for body in assembled], unknowns, scene.dim, solvers, Q, once)
-    if not costs:  # a solver of others, whose costs nobody knows
+    if not costs:  # an external solver, whose costs nobody knows
         iterative = any(body.iterates(solver) for body in assembled)
         return ("implicit" if iterative else "explicit") if Q == "auto" else Q, solver
     way, solver = min(costs, key=lambda own: costs[own])

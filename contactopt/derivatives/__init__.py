@@ -1,4 +1,4 @@
-"""Derivatives of certified solutions, and what is built on them: calibration and design.
+"""Derivatives of certified solutions.
 
 A solution (r, lambda) of an interface problem solves the equations of Newton's method
 (contactopt.methods.kernels.semismooth),

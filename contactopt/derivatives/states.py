@@ -24,15 +24,13 @@ from typing import Any
 import numpy as np
 
 from contactopt.checks import real_array
-from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
 from contactopt.derivatives.kinks import Weak
 from contactopt.errors import InputError
-from contactopt.methods.driver import solve
 from contactopt.problem import Solution
 from contactopt.readings.state import Seeds, State
 from contactopt.scenes.parameters import MATERIAL, Parameter
-from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
 
 Direction = Mapping[Parameter, Any]  # a number, or for a field one per contact
@@ -271,34 +269,3 @@ def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray
             f"the change of '{which.name}' must have the shape ({contacts},); got {array.shape}."
         )
     return np.broadcast_to(array, (contacts,))
-
-
-def solved_chain(
-    scenes: Sequence[Scene],
-    tol: float,
-    base: Reduction | None = None,
-    starts: Sequence[Solution] | None = None,
-    Q: str = "auto",
-    gap: np.ndarray | float = 0.0,
-) -> Chain:
-    """Solve the states of a load path, without their energies, to the certificate `tol`, with `gap`
-    (k,) added and a start for each, on `base` loaded anew if given. InputError if one is unsolved.
-    """
-    steps: list[Step] = []
-    slipped: Any = 0.0
-    for number, scene in enumerate(scenes):
-        base = reduce_bodies(scene, Q=Q) if base is None else base.loaded(scene)
-        q = base.problem.q.copy()
-        q[:, 1:] -= slipped
-        q[:, 0] += gap
-        problem = replace(base.problem, q=q)
-        start = starts[number] if starts is not None else steps[-1].solution if steps else None
-        solution = solve(problem, tol=tol, start=start)
-        if not solution.solved:
-            raise InputError(
-                f"state {number} of scene '{scene.name}' was not solved: {solution.message}."
-            )
-        steps.append(Step(replace(base, problem=problem), solution))
-        moved = problem.displacements(solution.reactions, solution.multipliers)
-        slipped = slipped + moved[:, 1:]
-    return Chain(tuple(steps))

@@ -2,7 +2,7 @@
 
 `read` takes both formats and both forms of HDF5 files; `write` writes HDF5, local form. A matrix
 that is mostly zeros stays sparse. Format of HDF5: FCLib 1.x,
-https://frictionalcontactlibrary.github.io, which needs h5py (`pip install 'contactopt[fclib]'`).
+https://frictionalcontactlibrary.github.io, which needs h5py (the extra `fclib`).
 """
 
 from __future__ import annotations

@@ -56,7 +56,7 @@ def _mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] 
     It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact
     line at the origin of its chart, across the line.
     """
-    if scene.kind == "axisymmetric":
+    if scene.analysis.revolved:
         return 0, 0.0
     chart, x = problem.chart, problem.coordinates
     if scene.copies != 2 or not chart.mirrored[0] or len(x) != 2:

@@ -21,7 +21,8 @@ from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
 from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
-from contactopt.scenes.scene import COMPONENTS, BodyForce, Part, Plate, Scene, Traction
+from contactopt.scenes.kinds import KINDS
+from contactopt.scenes.scene import BodyForce, Part, Plate, Scene, Traction
 
 ROLES = ("no use", "support", "load", "plate", "contact")
 
@@ -50,8 +51,10 @@ def write_mesh_page(
     InputError if the file cannot be written.
     """
     dim = len(next(iter(meshes.values())).p)
-    own: Any = SimpleNamespace(name=name, units=("length", "stress"), dim=dim, kind="solid")
-    own.components = COMPONENTS["solid"][:dim]
+    own: Any = SimpleNamespace(
+        name=name, units=("length", "stress"), dim=dim, analysis=KINDS["solid"]
+    )
+    own.components = KINDS["solid"].components[:dim]
     roles = [
         "none",
         *dict.fromkeys(side for one in meshes.values() for side in one.boundaries or {}),
@@ -88,7 +91,7 @@ def _write(
         "units": units,
         "dim": scene.dim,
         "axes": list(scene.components),
-        "ring": scene.kind == "axisymmetric",
+        "ring": scene.analysis.revolved,
         "mirrors": planes,
         "box": box.tolist(),
         "near": box.tolist(),
@@ -113,6 +116,7 @@ def _write(
         followers="",
         arrows="loads, and normals from the lower to the upper body,",
         convention="A negative gap is an overlap. The arrow of a plate is its total force.",
+        pairs="",
         cells=f"<tr><td>{lines.removeprefix('<br>')}</td></tr>",
     )
     return write_html(

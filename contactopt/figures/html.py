@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.defaults import install
 from contactopt.errors import InputError
 from contactopt.files.writing import whole_file
 
@@ -36,9 +37,7 @@ SHORT = 65535  # the largest number of two bytes
 def check_installed() -> None:
     """Raise InputError unless plotly is installed, of which the pages hold a copy."""
     if find_spec("plotly") is None:
-        raise InputError(
-            "pages to explore need plotly; install it with: pip install 'contactopt[view]'."
-        )
+        raise InputError(f"pages to explore need plotly; {install('view')}.")
 
 
 def packed(array: Any) -> dict[str, Any]:

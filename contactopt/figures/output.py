@@ -33,6 +33,11 @@ PICTURES = ("deformed", "maps", "pressure", "path", "refinement")
 SERIES = "states.pvd"
 SINGLE = re.compile(r"-state\d{4}\.vtu$")  # names of the files of single states
 VTU = re.compile(r"(.*?)(-state\d{4})?\.vtu")  # of all fields
+FAR = 1e3  # sizes of a body that it moves in an iterate which no figure can show
+UNDRAWN = (
+    "no figure and no page was made: the last iterate moves a body by more than a thousand times"
+    " its size."
+)
 STATUS = ("open", "stick", "slip")
 # of the bodies at all states of a load path, above which only the last state is written
 MOST_NUMBERS = 3_000_000
@@ -100,6 +105,15 @@ def write(result: Outcome, folder: Path) -> None:
         path.write(folder)
         write_series(path, result.fields, folder)
     write_tables(result, surfaces, folder)
+
+
+def not_drawable(result: Outcome) -> str:
+    """Why nobody can draw an answer, one sentence; empty where a figure can show it."""
+    still = result.solution.solved or all(
+        bool(np.abs(own.displacement).max(initial=0.0) <= FAR * np.ptp(own.mesh.p))
+        for own in result.fields
+    )
+    return "" if still else UNDRAWN
 
 
 def write_tables(result: Outcome, surfaces: Sequence[ContactFields], folder: Path) -> None:

@@ -26,6 +26,7 @@ from contactopt.figures.pieces import (
     triangles,
 )
 from contactopt.figures.style import highest_colour, magnification
+from contactopt.scenes.kinds import KINDS
 
 REACH = 4.0  # sizes of a small contact surface that the first picture of large bodies shows
 # cosine of the angle between two faces from which on their edge is drawn
@@ -46,9 +47,8 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     path = _arrays(folder / "path.npz") if (folder / "path.npz").exists() else None
     moving = path is not None and (folder / SERIES).exists()
     pairs = {name: meshes[f"contact-{name}"] for name in summary["pairs"]}
-    axes = {"axisymmetric": ["r", "z"], "plane-strain": ["x", "y"]}.get(
-        summary["kind"], ["x", "y", "z"]
-    )
+    kind = KINDS[summary["kind"]]
+    axes = list(kind.components)
     mirrors = [[axes.index(plane["axis"]), plane["place"]] for plane in summary["mirrors"]]
     fields = {name: _body_values(mesh.point_data, len(axes)) for name, mesh in bodies.items()}
     if path is not None and moving:
@@ -71,7 +71,7 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "units": [*summary["units"], force_unit(summary["units"])],
         "dim": len(axes),
         "axes": axes,
-        "ring": summary["kind"] == "axisymmetric",
+        "ring": kind.revolved,
         "mirrors": mirrors,
         "box": box.tolist(),
         "near": near.tolist(),

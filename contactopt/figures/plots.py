@@ -37,12 +37,10 @@ from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
-    from contactopt.derivatives.design import Design
-    from contactopt.derivatives.fit import Fit
 
 __all__ = [
-    "contact_figure", "contact_line", "contact_place", "convergence", "deformed", "design",
-    "energies", "fit", "loop", "maps_figure", "path_figure", "pressure", "refinement_figure",
+    "contact_figure", "contact_line", "contact_place", "convergence", "deformed", "energies",
+    "loop", "maps_figure", "path_figure", "pressure", "refinement_figure",
     "stick_map", "traction",
 ]  # fmt: skip
 STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
@@ -112,7 +110,8 @@ def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     line, place = contact_line(problem), contact_place(problem)
     x, p = place[line], solution.reactions[line, 0] / problem.areas[line]
     a = contact_edge(scene, problem, solution.reactions)
-    mean = solution.reactions[:, 0].sum() / contact_area(scene, a) if a > 0 else 0.0
+    area = contact_area(scene, problem, solution.reactions)
+    mean = solution.reactions[:, 0].sum() / area if area > 0 else 0.0
     scaled, mean = _about_origin(problem, solution, place, a), mean or 1.0
     unit = a if scaled else 1.0
     ax.plot(x / unit, p / mean, "o-", color=BLUE, label="contactopt")
@@ -324,37 +323,6 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
         residual = [h["residual"] for h in solution.history]
         ax.semilogy(range(1, len(residual) + 1), residual, "o-", color=colour, label=label)
     ax.set(xlabel="outer iteration [-]", ylabel="natural-map residual [-]")
-    add_legend(ax)
-    return ax
-
-
-def fit(found: Fit, ax: Any = None) -> Any:
-    """Draw what the model leaves of the data, over the standard deviation of the noise."""
-    ax = make_axes(ax)
-    for (name, measured), colour in zip(found.data.items(), cycle(COLOURS)):
-        rest = (measured - found.model[name]) / (found.noise[name] or 1.0)
-        ax.plot(np.arange(len(rest)), rest, "o-", color=colour, label=name)
-    ax.axhline(0.0, color=GREY, lw=0.8)
-    ax.axhspan(-1.96, 1.96, color=GREY, alpha=0.12, lw=0, label="95 % of normal noise")
-    found_values = "; ".join(f"{name} = {value:.4g}" for name, value in found.values.items())
-    ax.set(xlabel=f"state [-]; {symbols(found_values)}", ylabel="(measured - computed) / noise [-]")
-    add_legend(ax)
-    return ax
-
-
-def design(found: Design, ax: Any = None) -> Any:
-    """Draw the pressure of the designed contact over the place along the surface, and its mean."""
-    ax = make_axes(ax)
-    scene, problem = found.reduction.scene, found.reduction.problem
-    place = problem.chart.places[0]
-    order = np.argsort(place)
-    touching = problem.law.pressed(found.solution.reactions)
-    mean = float(np.average(found.pressure[touching], weights=problem.areas[touching]))
-    points = "." if problem.dim == 3 else ".-"
-    ax.plot(place[order], found.pressure[order], points, color=BLUE, label="pressure")
-    ax.axhline(mean, color=GREY, lw=0.8, label=f"mean (largest / mean = {found.unevenness:.4f})")
-    ax.set(xlabel=f"place [{scene.units[0]}]", ylabel=f"pressure [{scene.units[1]}]")
-    ax.set_ylim(0.0, 1.2 * found.peak)
     add_legend(ax)
     return ax
 

@@ -16,6 +16,7 @@ from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.motions import kernel, whole_motions
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import count
+from contactopt.checks import overheard
 from contactopt.coupling.compliance import filling
 from contactopt.coupling.costs import FORM_OF, estimates
 from contactopt.coupling.coupling import Coupling
@@ -24,7 +25,7 @@ from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.unbalanced_loads import escape, sentence
-from contactopt.readings.validity import SHARE
+from contactopt.readings.plausibility import doubts
 from contactopt.scenes.scene import Plate, Scene
 from contactopt.solving.solve_scene import STEPS
 
@@ -65,18 +66,23 @@ class SceneCheck:
     text: str
 
 
-def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) -> SceneCheck:
+def check_scene(
+    states: Sequence[Scene], solve: dict[str, Any] | None = None, told: Sequence[str] = ()
+) -> SceneCheck:
     """Look at a scene without solving it. InputError for a scene that cannot be solved at all.
 
     states  the scene, or the states of its load path, of which the last one is described
     solve   options of the run that it is meant for: method, Q, solver
+    told    remarks that were made before, when the scene was read
     """
     scene, options = states[-1], solve or {}
-    made = posed(scene)
+    with overheard() as heard:
+        made = posed(scene)
     free = _free_problem(scene, made)
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
-    notes = [*_balance(states, made, free), *_gap_notes(scene, made)]
+    coupled = [text for own in made.couplings for text in own.remarks]
+    notes = [*told, *heard, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
@@ -88,7 +94,9 @@ def check_scene(states: Sequence[Scene], solve: dict[str, Any] | None = None) ->
         lines += _pair_lines(scene, pair, own)
     if scene.copies > 1:
         where = " and ".join(_direction(plane.inward) for plane in made.planes)
-        lines.append(f"{scene.copies} images make the whole, across planes with normals {where}")
+        where = where and f", across planes with normals {where}"
+        none = "; no support holds a plane of symmetry, so that none is known"
+        lines.append(f"{scene.copies} images make the whole{where or none}")
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states; the last one is described")
     lines += _cost_lines(costs, memory, len(states))
@@ -112,7 +120,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     mean of that of its nodes.
     """
     body = assembled.body
-    R, labels = whole_motions(scene.kind, scene.components, body.basis)
+    R, labels = whole_motions(scene.analysis, body.basis)
     mean = body.motion.T / np.maximum(body.motion.sum(axis=0), 1.0)[:, None]
     held = np.ones(len(R), dtype=bool)
     held[body.free] = False
@@ -189,7 +197,8 @@ def _pair_lines(scene: Scene, pair: Any, own: Coupling) -> list[str]:
     total = float(own.areas.sum())
     lines = [
         f"pair '{pair.name}': {pair.friction}; {count(len(own.gap), 'contact')} by {own.kind},"
-        f" area {total:.5g} {length}^2"
+        f" area {total:.5g} {length}^2",
+        f"  by {own.kind} because {own.why}",
     ]
     normals = own.frames[:, 0]
     mean = np.average(normals, axis=0, weights=own.areas)
@@ -206,21 +215,6 @@ def _pair_lines(scene: Scene, pair: Any, own: Coupling) -> list[str]:
         share = float(own.areas[overlap].sum()) / total
         words.append(f"{overlap.sum()} overlap, {share:.0%} of the area")
     return [*lines, f"  {', '.join(words)}"]
-
-
-def _gap_notes(scene: Scene, made: Posed) -> list[str]:
-    """Surfaces that overlap much or are far apart."""
-    notes, length = [], scene.units[0]
-    for pair, own in zip(scene.pairs, made.couplings):
-        size, least = _size(own), float(own.gap.min())
-        how = f"overlap by up to {-least:.4g} {length}"
-        how = how if least < 0 else f"are {least:.4g} {length} or more apart"
-        if abs(least) > SHARE * size:
-            notes.append(
-                f"the surfaces of '{pair.name}' {how}, more than {SHARE:.0%} of their extent: is a"
-                " body misplaced, or a unit of length wrong?"
-            )
-    return notes
 
 
 def _costs(

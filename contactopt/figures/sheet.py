@@ -90,7 +90,7 @@ def _argument_lines(name: str) -> list[str]:
 
 
 def _section(scene: Scene) -> str:
-    if scene.kind == "axisymmetric":
+    if scene.analysis.revolved:
         return "  (one half of the section)"
     return "" if scene.copies == 1 else "  (the part that is modelled)"
 

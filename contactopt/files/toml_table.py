@@ -17,6 +17,9 @@ from typing import Any
 from contactopt.checks import check_number, meant, short
 from contactopt.errors import InputError
 
+LARGEST = 10**300
+# what tomllib says of an entry or a table that is there twice
+TWICE = re.compile(r"Cannot (?:overwrite|declare|mutate|expand|redefine)")
 MOST_BYTES = 1_000_000  # bytes of a file that people write
 TOKEN = re.compile(
     r"""(?P<space>[ \t\r\n]+|\#[^\n]*)
@@ -178,7 +181,7 @@ def read_table(path: Path, what: str = "scene file") -> Table:
         )
     try:
         text = path.read_bytes().decode().replace("\r\n", "\n")
-        data = tomllib.loads(text)
+        data = parse(text)
         return Table(path.name, lines_of(text), data)
     except UnicodeDecodeError as error:
         raise InputError(f"{what} '{path}' is no text in UTF-8.") from error
@@ -186,9 +189,38 @@ def read_table(path: Path, what: str = "scene file") -> Table:
         found = re.search(r" \(at line (\d+), column \d+\)", str(error))
         line = int(found[1]) if found else text.count("\n") + 1
         said = re.sub(r" \(at .*\)", "", str(error))
+        if TWICE.match(said):
+            said = f"this name is there twice ({said[:1].lower()}{said[1:]})"
         raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
     except (RecursionError, OSError) as error:
         raise InputError(f"{what} '{path}' cannot be read: {type(error).__name__}.") from error
+
+
+def parse(text: str) -> dict[str, Any]:
+    """The data of a text in TOML. tomllib.TOMLDecodeError where it is none, and where a whole
+    number is larger than a number with a point can be.
+    """
+    try:
+        data = tomllib.loads(text)
+        large = [value for value in _values(data) if type(value) is int and abs(value) > LARGEST]
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError:  # Python reads no number of more than 4300 digits
+        large = [0]
+    if large:
+        digits = re.search(r"[0-9A-Fa-f_]{250}", text)
+        line = text.count("\n", 0, digits.start() if digits else 0) + 1
+        raise tomllib.TOMLDecodeError(f"A number is too large (at line {line}, column 1)")
+    return data
+
+
+def _values(data: Any) -> Iterator[Any]:
+    """All values in tables and arrays."""
+    if isinstance(data, dict | list):
+        for value in data.values() if isinstance(data, dict) else data:
+            yield from _values(value)
+    else:
+        yield data
 
 
 def change(table: Table, changes: Mapping[str, Any]) -> Table:
@@ -198,7 +230,7 @@ def change(table: Table, changes: Mapping[str, Any]) -> Table:
     """
     lines: dict[Place, int | str] = dict(table.lines)
     for name, value in changes.items():
-        told = f"--set {name}={value}"
+        told = f"--set {name}={value}"[:80]
         place: Place = ()
         at: Any = table.data
         *parents, last = _keys(name)
@@ -233,7 +265,8 @@ def _step(table: Table, told: str, place: Place, key: str, at: Any) -> str | int
     """A key of what stands at a place, of an array as a number from 0 on."""
     if not isinstance(at, dict | list):
         raise table.fail(f"{told}: {place[-1]!r} holds {short(at)}, and nothing in it.")
-    return int(key) - 1 if isinstance(at, list) and key.isdigit() and int(key) > 0 else key
+    number = int(key) if isinstance(at, list) and re.fullmatch("[0-9]{1,9}", key) else 0
+    return number - 1 if number > 0 else key
 
 
 def _lost(table: Table, told: str, parents: Any, key: str | int, at: Any) -> InputError:

@@ -6,6 +6,7 @@ Also pipes to other processes, which may be dead when one writes to them.
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 import signal
@@ -14,11 +15,21 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from contactopt.checks import check_name
 from contactopt.errors import InputError
 
 OLD = 86400.0  # s after which a hidden folder was left behind by a program that was killed
+
+
+def finite(value: Any) -> Any:
+    """The same tables and lists with None for every number that is not finite, as JSON has it."""
+    if isinstance(value, dict):
+        return {key: finite(own) for key, own in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(own) for own in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def check_folder(out: Path) -> None:
@@ -87,9 +98,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def _staging(folder: Path) -> Iterator[Path]:
-    """A hidden folder for files to come. Those of programs that were killed are removed, once they
-    are OLD.
-    """
+    """A hidden folder for files to come. Those of killed programs are removed once they are OLD."""
     for old in folder.glob(".contactopt-*"):
         with suppress(OSError):
             if time.time() - old.stat().st_mtime > OLD:

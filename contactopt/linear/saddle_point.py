@@ -4,80 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.linear.counter import Counter
 from contactopt.linear.deadline import check_time
-from contactopt.linear.stacked import Stacked, in_turn
+from contactopt.linear.stacked import Stacked
 
 Act = Callable[[np.ndarray], np.ndarray]
 MOST_ITERATIONS = 60  # conjugate gradient iterations towards equilibrium
 
 
-class BodyTerm(Protocol):
+@dataclass(frozen=True, eq=False)
+class BodyTerm:
     """What one body with N displacement unknowns X adds to the coupled form.
-
-    X is an array, or a vector elsewhere.
 
     With A its stiffness and T (n, N) the map from X to u, the body's part of Q is T A^-1 T' + L R'.
 
-    elsewhere  whether X lives in another process
-    size       N
+    trace      T
+    stiffness  A X [force] for a displacement X (N,) [length]
+    cycle      B F [length] for forces F (N,), with B positive definite and close to A^-1
+    diagonal   that of A (N,) [force / length]
     low_rank   L and R (n, i)
     """
-
-    @property
-    def elsewhere(self) -> bool: ...
-
-    @property
-    def size(self) -> int: ...
-
-    @property
-    def low_rank(self) -> tuple[np.ndarray, np.ndarray]: ...
-
-    def diagonal(self) -> Any:
-        """The diagonal of A (N,) [force / length]."""
-
-    def stiffness(self, X: Any) -> Any:
-        """A X [force] for a displacement X (N,) [length]."""
-
-    def cycle(self, F: Any) -> Any:
-        """B F [length] for forces F (N,), with B positive definite and close to A^-1."""
-
-    def pulled(self, r: np.ndarray) -> Any:
-        """T' r (N,): the contact forces r (n,) on the unknowns of the body [force]."""
-
-    def started_trace(self, X: Any) -> Callable[[], np.ndarray]:
-        """Begin with T X (n,) [length], elsewhere at once, and return the function that ends it."""
-
-
-@dataclass(frozen=True, eq=False)
-class LocalTerm:
-    """The term of a body in this process, by its matrices and functions as in BodyTerm."""
 
     trace: sp.csr_matrix
     stiffness: Act
     cycle: Act
-    entries: np.ndarray
+    diagonal: np.ndarray
     low_rank: tuple[np.ndarray, np.ndarray]
-    elsewhere = False
 
     @property
     def size(self) -> int:
         return self.trace.shape[1]
-
-    def diagonal(self) -> np.ndarray:
-        return self.entries
-
-    def pulled(self, r: np.ndarray) -> np.ndarray:
-        return np.asarray(self.trace.T @ r)
-
-    def started_trace(self, X: np.ndarray) -> Callable[[], np.ndarray]:
-        made = np.asarray(self.trace @ X)
-        return lambda: made
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,15 +74,15 @@ class CoupledForm:
 
     def _each(self, act: Callable[..., Any], *columns: Stacked) -> Stacked:
         """A vector in parts, of a function of each term and its parts."""
-        return Stacked(tuple(in_turn(act, self.terms, *(column.parts for column in columns))))
+        return Stacked(tuple(map(act, self.terms, *(column.parts for column in columns))))
 
     def diagonal(self) -> Stacked:
         """Give the diagonal of A in all bodies, as a vector in parts."""
-        return self._each(lambda term: term.diagonal() / self.factor)
+        return self._each(lambda term: term.diagonal / self.factor)
 
     def pulled(self, r: np.ndarray) -> Stacked:
         """Take contact forces r (n,) to the bodies: T' r, as a vector in parts."""
-        return self._each(lambda term: term.pulled(r))
+        return self._each(lambda term: term.trace.T @ r)
 
     def stiffness(self, X: Stacked) -> Stacked:
         """Multiply displacements X of the bodies with A."""
@@ -134,8 +95,8 @@ class CoupledForm:
 
     def moved(self, X: Stacked, r: np.ndarray) -> np.ndarray:
         """T X + rest r (n,) [length], which is Q r in equilibrium."""
-        started = in_turn(lambda term, own: term.started_trace(own), self.terms, X.parts)
-        return np.asarray(sum((own() for own in started), self.rest(r)))
+        own = (term.trace @ part for term, part in zip(self.terms, X.parts))
+        return np.asarray(sum(own, self.rest(r)))
 
     def unbalanced(self, X: Stacked, r: np.ndarray) -> Stacked:
         """T' r - A X: the forces that are missing to equilibrium."""

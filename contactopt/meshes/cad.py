@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.checks import check_number, meant
+from contactopt.defaults import install
 from contactopt.errors import InputError
 
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -55,7 +56,9 @@ def mesh_part(
             gmsh.model.occ.importShapes(str(path))
             gmsh.model.occ.synchronize()
         except Exception as error:  # the class of Gmsh's errors is Exception
-            raise InputError(f"part '{path}' cannot be read: {error}") from error
+            raise InputError(f"part '{path}' cannot be read: {_reason(error)}.") from error
+        if not gmsh.model.getEntities():
+            raise InputError(f"part '{path}' holds no shapes.")
         box = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
         plane = np.ptp(box[:, 2]) < FLAT * np.ptp(box, axis=0).max()
         if not plane and not gmsh.model.getEntities(3):  # IGES files hold the faces of a solid
@@ -88,8 +91,15 @@ def mesh_part(
             bare = [name for name, tag in sides.items() if not elements(dim - 1, tag)[1]]
             how = f"No element fits on {', '.join(bare)}: mend it, or try" if bare else "Try"
             raise InputError(
-                f"part '{path}' cannot be meshed ({error}). {how} smaller elements."
+                f"part '{path}' cannot be meshed ({_reason(error)}). {how} smaller elements."
             ) from error
+
+
+def _reason(error: Exception) -> str:
+    """What Gmsh says of a fault, which may be nothing."""
+    said = " ".join(str(error).split()).rstrip(".")
+    vague = not said or "unknown error" in said.lower() or "last error" in said.lower()
+    return "Gmsh gives no reason" if vague else said
 
 
 @contextmanager
@@ -98,9 +108,7 @@ def _kernel() -> Iterator[Any]:
     try:
         import gmsh
     except (ImportError, OSError) as error:  # OSError: a library of the system is missing
-        raise InputError(
-            f"this needs Gmsh ({error}); install it: pip install 'contactopt[mesh]'."
-        ) from error
+        raise InputError(f"this needs Gmsh ({error}); {install('mesh')}.") from error
     begun = not gmsh.isInitialized()
     if begun:
         gmsh.initialize(interruptible=False)

@@ -35,7 +35,7 @@ CORNER = np.deg2rad(35)
 # unless it is an arc that is tangent to the edges beside it, and turns by less
 LARGEST = np.deg2rad(75)
 ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
-# a smaller turn is a corner if it is more than this, and times what its neighbours let expect
+# a smaller turn is a corner if it is more than this, and times what its neighbours suggest
 KINK = np.deg2rad(5), 5.0
 # the middle of an edge is off the chord by more than this fraction of it, or the edge is straight
 STRAIGHT = 1e-9
@@ -45,9 +45,7 @@ STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and 
 
 
 def plane_curves(mesh: Any) -> dict[str, Curve | None]:
-    """By the name of each boundary of a plane mesh, '' for what has none, its curve, or None where
-    it is straight.
-    """
+    """By the name of each boundary of a plane mesh, '' for others: its curve, None if straight."""
     facets = mesh.boundary_facets()
     edges, points, owner, known = _edges(mesh, facets)
     ends = np.zeros((2, edges.shape[1]))

@@ -2,7 +2,7 @@
 
 meshio needs netCDF4, and loses side sets and the names of blocks. The files are netCDF: of the
 classic kind, which scipy reads, or HDF5, which h5py reads. Side k of an element is a face of
-contactopt.meshes.inp.FACES, counted from another first one.
+contactopt.meshes.inp_elements.FACES, counted from another first one.
 
 Source: L. Schoof and V. Yarberry, EXODUS II: a finite element data model, SAND92-2137.
 """
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.meshes.inp import FACES, FACET
+from contactopt.meshes.inp_elements import FACES, FACET
 
 # type without its number of nodes -> that number -> type in meshio
 TYPES = {
@@ -23,8 +23,13 @@ TYPES = {
     "QUA": {4: "quad", 8: "quad8", 9: "quad9"},
     "TET": {4: "tetra", 10: "tetra10"},
     "HEX": {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"},
-}
-FIRST = {"tetra": 1, "hexahedron": 2}  # place in FACES of the first side
+    "SHE": {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"},
+    "WED": {6: "wedge"}, "PYR": {5: "pyramid"},
+    **{name: {2: "line", 3: "line3"} for name in ("BAR", "BEA", "TRU", "EDG")},
+    "SPH": {1: "vertex"}, "CIR": {1: "vertex"},
+}  # fmt: skip
+# place in FACES of the first side
+FIRST = {"tetra": 1, "hexahedron": 2, "wedge": 2, "pyramid": 1}
 # nodes of Exodus in the order of meshio: edges along the third axis come last, then faces, centre
 HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22, 20]
 
@@ -55,7 +60,9 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
     else:
         axes = [f"coord{axis}" for axis in "xyz" if f"coord{axis}" in variables]
         points = np.stack([np.array(variables[axis][:], dtype=float) for axis in axes], axis=1)
-    cells, starts, sets, end = [], [], {}, 0
+    cells: list[tuple[str, np.ndarray]] = []
+    sets: dict[str, dict[int, np.ndarray]] = {}
+    starts, end, shells = [], 0, set[int]()
     for name, number in _named(variables, "eb", "connect", "block"):
         variable = variables[f"connect{number}"]
         nodes, text = np.array(variable[:], dtype=np.int64) - 1, type_of(variable)
@@ -63,32 +70,45 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
         starts.append(end)
         end += len(nodes)
         kind = kinds.get(nodes.shape[1], "")
+        if not kind:
+            raise ValueError(f"the elements of block {name!r} are of a type that is not known")
         if kind.startswith("hexahedron"):
             nodes = nodes[:, HEXAHEDRON[: nodes.shape[1]]]
         cells.append((kind, nodes))
+        shells |= {len(cells) - 1} if TYPES["SHE"] is kinds else set()
         sets[name] = {len(cells) - 1: np.arange(len(nodes))}
     for name, number in _named(variables, "ss", "elem_ss", "side"):
         elements = np.array(variables[f"elem_ss{number}"][:], dtype=np.int64) - 1
         sides = np.array(variables[f"side_ss{number}"][:], dtype=np.int64) - 1
-        sets[name] = {}
-        for (kind, nodes), start in list(zip(cells, starts)):
-            faces = FACES.get(kind.rstrip("0123456789"), ())
+        own_sets, known = sets.setdefault(name, {}), 0
+        for block, start in enumerate(starts):
+            kind, nodes = cells[block]
+            faces = _sides(kind.rstrip("0123456789"), block in shells)
             own = (elements >= start) & (elements < start + len(nodes))
-            for side in range(len(faces)) if own.any() else ():
-                here = elements[own & (sides == side)] - start
-                first = FIRST.get(kind.rstrip("0123456789"), 0)
-                facets = nodes[here][:, list(faces[(side + first) % len(faces)])]
-                sets[name][len(cells)] = np.arange(len(facets))
+            for side, corners in enumerate(faces if own.any() else ()):
+                facets = nodes[elements[own & (sides == side)] - start][:, list(corners)]
+                own_sets[len(cells)] = np.arange(len(facets))
                 cells.append((FACET[facets.shape[1]], facets))
-    known = [i for i, (kind, _) in enumerate(cells) if kind]
+                known += len(facets)
+        if known < len(elements):
+            raise ValueError(f"side set {name!r} names an element or a side that is not known")
     of_cells = {
-        name: [own.get(i, np.zeros(0, dtype=int)) for i in known] for name, own in sets.items()
+        name: [own.get(i, np.zeros(0, dtype=int)) for i in range(len(cells))]
+        for name, own in sets.items()
     }
     of_points = {
         name: np.array(variables[f"node_ns{number}"][:], dtype=np.int64) - 1
         for name, number in _named(variables, "ns", "node_ns", "nodes")
     }
-    return meshio.Mesh(points, [cells[i] for i in known], cell_sets=of_cells, point_sets=of_points)
+    return meshio.Mesh(points, cells, cell_sets=of_cells, point_sets=of_points)
+
+
+def _sides(kind: str, shell: bool) -> tuple[tuple[int, ...], ...]:
+    """The corners of the sides of an element; the first two of a shell are the shell itself."""
+    faces = FACES.get(kind, ())
+    first = FIRST.get(kind, 0)
+    itself = (tuple(range(len(faces))),) * 2
+    return (*itself, *faces) if shell else (*faces[first:], *faces[:first])
 
 
 def _named(variables: Mapping[str, Any], kind: str, key: str, word: str) -> list[tuple[str, int]]:

@@ -9,7 +9,8 @@ on a sphere or on a cylinder. Every other region is a patch of quadratic triangl
 where d_ij leads from the middle of an edge to the surface: to the node there, of elements of second
 order; for others by the normals n at its ends, d = n ((n_j - n_i) . (x_j - x_i)) / 8, which a
 quadratic fits to the nodes around a vertex, or which are those of a flat facet there. Points in the
-plane of a flat facet at an edge of the body stay in it.
+plane of a flat facet at an edge of the body stay in it. The two terms of d are what each end tells;
+where these differ, the smaller one gives the other shape that the surface may have.
 
 Source: Nagata (2005), Simple local interpolation of surfaces using normal vectors, Computer Aided
 Geometric Design 22.
@@ -35,19 +36,23 @@ FEWEST = 6  # any so many nodes may lie on a sphere or cylinder
 SAMPLE = 1000  # nodes to which spheres and cylinders are fitted
 NEAREST = 16  # triangles among which the one nearest to a point is looked for
 ALTERNATE = 60  # projections on a surface and on a plane in turn
+SAME = 1e-3  # relative difference of what two ends tell that rounding of files makes
+TRIED = 4  # of these triangles on whose patches a point may lie
+FOOTS = 6  # projections on the triangle below a point of its patch, which gain a digit each
+STRETCHED = 10.0  # times the way to the surface that the way to it within a plane may be
 PREFER = 1e-6  # by how much less a curved triangle may be near than a flat one
 Shape = Callable[[np.ndarray], np.ndarray]
 
 
 def space_curves(mesh: Any) -> dict[str, Curve | None]:
-    """By the name of each boundary of a solid's mesh, '' for what has none, its surface, or None
-    where it is flat.
-    """
-    skin, found = _Skin(mesh), dict[str, Curve | None]()
+    """By the name of each boundary of a solid's mesh, '' for others, its surface, None if flat."""
+    skin, found = _Skin(mesh), dict[str, Any]()
     for name, label, mine in shares(mesh, skin.owner):
         found[name] = None
         if np.any(skin.region[mine] >= 0):
-            found[name] = Curve(_Patches(skin, mine), skin.known, label)
+            found[name] = Curve(_Patches(skin, mine, skin.off), skin.known, label)
+            if np.any(skin.other[:, :, mine] != skin.off[:, :, mine]):
+                found[name].other = _Patches(skin, mine, skin.other)
     return found
 
 
@@ -56,7 +61,8 @@ class _Skin:
 
     nodes    (3, t) their corners;   owner  (t,) the facet of the mesh
     corners  (3, 3, t) places of the corners
-    off      (3, 3, t) from the middles of edges 01, 12, 20 to the surface
+    off      (3, 3, t) from the middles of edges 01, 12, 20 to the surface;   other  to its other
+             shape
     planes   (3, 3, t) normals of flat triangles beyond these edges, nan where the body has no edge
     region   (t,) the number of the region, -1 of flat triangles
     shapes   of each region its sphere or cylinder, or None
@@ -87,8 +93,16 @@ class _Skin:
         self.region[~flat] = np.unique(self.region[~flat], return_inverse=True)[1]
         self.shapes = [self._shape(region) for region in range(self.region.max(initial=-1) + 1)]
         free = np.array([shape is None for shape in self.shapes] + [False])[self.region]
+        self.other = self.off.copy()
         if not self.known:
-            self._guess(free, flat)
+            given = np.full((3, self.nodes.max() + 1), np.nan)
+            for here, there in ((0, 1), (1, 0)):  # a flat facet that a curved one continues
+                rim = smooth & flat[pairs[here]] & ~flat[pairs[there]]
+                plane = self.normals[:, pairs[here, rim]]
+                for corner in (0, 1):
+                    node = self.nodes[(sides[here, rim] + corner) % 3, pairs[here, rim]]
+                    given[:, node] = plane
+            self._guess(free, given)
 
     def _flat(self, pairs: np.ndarray, sides: np.ndarray, smooth: np.ndarray) -> np.ndarray:
         """Whether each triangle (t,) is flat, with its piece or with all others at a corner."""
@@ -119,10 +133,10 @@ class _Skin:
         near = max(self.near, FIT * np.ptp(places, axis=1).max())
         return _sphere(places, near) or _cylinder(places, self.normals[:, mine], near)
 
-    def _guess(self, free: np.ndarray, flat: np.ndarray) -> None:
-        """Set the middles of the edges in free regions by the normals at their ends."""
-        given = np.full((3, self.nodes.max() + 1), np.nan)
-        given[:, self.nodes[:, flat]] = self.normals[:, None, flat]
+    def _guess(self, free: np.ndarray, given: np.ndarray) -> None:
+        """Set the middles of the edges in free regions by the normals at their ends, which are
+        `given` (3, n) or nan.
+        """
         places = np.empty_like(given)
         places[:, self.nodes] = self.corners
         for region in np.unique(self.region[free]):
@@ -130,8 +144,15 @@ class _Skin:
             normals = _vertex_normals(places, self.nodes[:, mine], self.normals[:, mine], given)
             at = normals[:, self.nodes[:, mine]]
             mean = _between(at) / np.linalg.norm(_between(at), axis=0)
-            bend = np.sum(_along(at) * _along(self.corners[:, :, mine]), axis=0)
-            self.off[:, :, mine] = mean * bend / 8
+            along = _along(self.corners[:, :, mine])
+            told = np.stack(
+                [-np.sum(n * along, axis=0) / 4 for n in (at, -np.roll(at, -1, axis=1))]
+            )
+            self.off[:, :, mine] = mean * told.mean(axis=0)
+            alike = np.ptp(told, axis=0) <= SAME * np.abs(told).max(axis=0)
+            least = np.where(np.prod(told, axis=0) > 0, np.abs(told).min(axis=0), 0.0)
+            least = np.where(alike, told.mean(axis=0), np.sign(told[0]) * least)
+            self.other[:, :, mine] = mean * least
 
 
 def _between(corners: np.ndarray) -> np.ndarray:
@@ -255,9 +276,10 @@ def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | N
 class _Patches:
     """The surface of some of the triangles."""
 
-    def __init__(self, skin: _Skin, mine: np.ndarray) -> None:
-        self.corners, self.off = skin.corners[:, :, mine], skin.off[:, :, mine]
+    def __init__(self, skin: _Skin, mine: np.ndarray, off: np.ndarray) -> None:
+        self.corners, self.off = skin.corners[:, :, mine], off[:, :, mine]
         self.planes = skin.planes[:, :, mine]
+        self.rims = _in_planes(self.off, self.planes)
         self.region, self.shapes, self.near = skin.region[mine], skin.shapes, skin.near
         self.tree = cKDTree(self.corners.mean(axis=1).T)
 
@@ -265,48 +287,79 @@ class _Patches:
         """The places (3, m) of points near the triangles."""
         count = min(NEAREST, len(self.region))
         near = self.tree.query(points.T, k=count)[1].reshape(points.shape[1], count)
-        weights, outside = barycentric(self.corners[:, :, near], points)
-        best = np.argmin(outside + PREFER * (self.region[near] < 0), axis=1)
-        rows = np.arange(len(best))
-        chosen, share = near[rows, best], np.clip(weights[rows, best].T, 0, 1)
-        share = share / share.sum(axis=0)
-        found = points.copy()
-        for region in np.unique(self.region[chosen]):
-            if region >= 0:
-                some = np.flatnonzero(self.region[chosen] == region)
-                found[:, some] = self._on(region, points[:, some], chosen[some], share[:, some])
+        outside = barycentric(self.corners[:, :, near], points)[1]
+        order = np.argsort(outside + PREFER * (self.region[near] < 0), axis=1)
+        ranked = np.take_along_axis(near, order, axis=1).T
+        found, within = self._on(points, ranked[0])
+        # a point of one patch may lie above the triangle of its neighbour
+        for other in ranked[1:TRIED]:
+            some = np.flatnonzero(~within & (self.region[other] == self.region[ranked[0]]))
+            there = self._on(points[:, some], other[some])[0]
+            away = [np.linalg.norm(x - points[:, some], axis=0) for x in (there, found[:, some])]
+            nearer = away[0] < away[1]
+            found[:, some[nearer]] = there[:, nearer]
         return found
 
-    def _on(
-        self, region: int, points: np.ndarray, chosen: np.ndarray, share: np.ndarray
-    ) -> np.ndarray:
-        """Points on triangles of a region; those in a plane beyond an edge of the body stay in."""
-        shape = self.shapes[region]
-        if shape is None:
-            both = share * np.roll(share, -1, axis=0)
-            found = np.einsum("ict,ct->it", self.corners[:, :, chosen], share)
-            found = found + 4 * np.einsum("iet,et->it", self.off[:, :, chosen], both)
-        else:
-            found = shape(points)
+    def _on(self, points: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The places of points on chosen triangles, those in a plane beyond an edge of the body in
+        this plane; and whether no other triangle can be meant.
+        """
+        found, within = points.copy(), np.ones(len(chosen), dtype=bool)
+        for region in np.unique(self.region[chosen]):
+            some = np.flatnonzero(self.region[chosen] == region)
+            if region >= 0 and self.shapes[region] is not None:
+                found[:, some] = self.shapes[region](points[:, some])
+            elif region >= 0:
+                found[:, some], within[some] = self._on_patch(points[:, some], chosen[some])
         for edge in range(3):
             normal = self.planes[:, edge, chosen]
             height = np.sum(normal * (points - self.corners[:, edge, chosen]), axis=0)
-            rim = np.abs(height) < 2 * self.near  # nothing where there is no plane
-            if rim.any():
-                found[:, rim] = _in_plane(found[:, rim], points[:, rim], normal[:, rim], shape)
-        return found
+            rim = (np.abs(height) < 2 * self.near) & (self.region[chosen] >= 0)
+            within |= rim  # nothing where there is no plane
+            for region in np.unique(self.region[chosen[rim]]):
+                some = np.flatnonzero(rim & (self.region[chosen] == region))
+                shape = self.shapes[region]
+                if shape is None:
+                    found[:, some] = self._on_rim(edge, points[:, some], chosen[some])
+                else:
+                    where = found[:, some], points[:, some], normal[:, some]
+                    found[:, some] = _in_plane(*where, shape)
+        return found, within
+
+    def _on_patch(self, points: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The places of points on the patches of chosen triangles, and whether these have them."""
+        corners, bulge = self.corners[:, :, chosen], np.zeros_like(points)
+        for _ in range(FOOTS):
+            weights = barycentric(corners[..., None], points - bulge)[0][:, 0].T
+            share = np.clip(weights, 0, 1)
+            share = share / share.sum(axis=0)
+            both = share * np.roll(share, -1, axis=0)
+            bulge = 4 * np.einsum("iet,et->it", self.off[:, :, chosen], both)
+        return np.einsum("ict,ct->it", corners, share) + bulge, np.all(weights >= 0, axis=0)
+
+    def _on_rim(self, edge: int, points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Points in the plane beyond an edge of the chosen triangles, on the curve of that edge."""
+        begin, end = self.corners[:, edge, chosen], self.corners[:, (edge + 1) % 3, chosen]
+        along = end - begin
+        t = np.sum((points - begin) * along, axis=0) / np.sum(along**2, axis=0)
+        t = np.clip(t, 0, 1)
+        return np.asarray(begin + t * along + 4 * t * (1 - t) * self.rims[:, edge, chosen])
+
+
+def _in_planes(off: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Ways (3, 3, t) from the middles of edges to the surface, turned into the planes beyond these
+    edges: no more than STRETCHED times as long, as where a surface ends in a plane at its tangent.
+    """
+    inside = off - normal * np.sum(off * normal, axis=0)
+    size, square = np.sum(inside**2, axis=0), np.sum(off**2, axis=0)
+    stretch = np.divide(square, size, out=np.ones_like(size), where=size > square / STRETCHED)
+    return np.asarray(inside * stretch)
 
 
 def _in_plane(
-    found: np.ndarray, points: np.ndarray, normal: np.ndarray, shape: Shape | None
+    found: np.ndarray, points: np.ndarray, normal: np.ndarray, shape: Shape
 ) -> np.ndarray:
-    """Places (3, m) moved into the planes of the points, and along them to the surface."""
-    if shape is None:
-        off = found - points
-        inside = off - normal * np.sum(off * normal, axis=0)
-        size = np.sum(inside**2, axis=0)
-        stretch = np.sum(off**2, axis=0) / np.where(size > 0, size, np.inf)
-        return np.asarray(points + inside * stretch)
+    """Places (3, m) moved into the planes of the points, and along them to a sphere or cylinder."""
     for _ in range(ALTERNATE):
         found = shape(found - normal * np.sum((found - points) * normal, axis=0))
     return np.asarray(found - normal * np.sum((found - points) * normal, axis=0))

@@ -1,296 +1,395 @@
 """Input files of CalculiX and Abaqus (.inp): nodes, elements, their sets and surfaces.
 
-meshio keeps only the last of several *NODE blocks, so that the bodies of one file exchange their
-nodes; it does not know plane and axisymmetric elements of second order, sets of sets, surfaces, and
-parts. A keyword line `*NAME, KEY=VALUE` is followed by lines of data. Elements without an extent
-(springs, masses, couplings) are passed over.
+contactopt.meshes.inp_text reads the keywords, contactopt.meshes.inp_generation makes nodes and
+elements from others. Elements without an extent (springs, masses, couplings) are passed over. What
+a set, a surface or an element names must be there; where it is not, its line is named.
 
 A part has numbers and sets of its own. An assembly holds instances of parts, each moved to its
 place, and sets of instances. Here an instance is a set of elements, the body. A set of a part is
 the union of those of its instances; which of them is meant is clear once a body has been chosen.
 
-Sources: CalculiX CrunchiX user's manual, version 2.20, chapters "Element types" and "Input deck
-format"; Abaqus user's manual, "Defining an assembly".
+Sources: CalculiX CrunchiX user's manual, version 2.22, chapters "Element types" and "Input deck
+format"; Abaqus user's manual, "Defining an assembly", "Element-based surface definition".
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-from copy import deepcopy
+import logging
+from collections.abc import Iterable
+from copy import copy
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-PLANE = {
-    "3": ("triangle", 3), "6": ("triangle6", 6),
-    "4": ("quad", 4), "8": ("quad8", 8), "9": ("quad9", 9),
-}  # fmt: skip
-SOLID = {
-    "4": ("tetra", 4), "10": ("tetra10", 10), "8": ("hexahedron", 8), "20": ("hexahedron20", 20),
-    "27": ("hexahedron27", 27), "6": ("wedge", 6), "15": ("wedge15", 15), "5": ("pyramid", 5),
-}  # fmt: skip
-LINE = {"2": ("line", 2), "1": ("line", 2), "3": ("line3", 3)}
-FAMILIES = (
-    (re.compile(r"D?C3D(\d+)"), SOLID),
-    (re.compile(r"(?:CPEG|CPE|CPS|CGAX|CAX|DC2D|M3D|R3D|STRI|S)(\d)"), PLANE),
-    (re.compile(r"T[23]D(\d)"), LINE),
-    (re.compile(r"B[23]([12])"), {"1": LINE["2"], "2": LINE["3"]}),
-)
-# corners of the numbered faces, by the kind of the element up to its order
-FACES = {
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
-    "hexahedron": (
-        *((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1)),
-        *((1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
-    ),
-}
-FACET = {2: "line", 3: "triangle", 4: "quad"}
-KEYWORDS = ("node", "element", "nset", "elset", "surface")
-DEEPEST = 10  # files that include each other
+from contactopt.errors import InputError
+from contactopt.meshes import inp_generation
+from contactopt.meshes.inp_elements import CORNERS, FACET, dimension, kind_of, side_of
+from contactopt.meshes.inp_text import LARGEST, Block, Named, bare, blocks, set_of
+from contactopt.meshes.mesh_repair import in_order
+
+log = logging.getLogger(__name__)
 
 
 def read_inp(path: Path) -> Any:
     """The mesh of a file, with sets of elements and of nodes by name. A surface is a set of facets.
 
-    ValueError, KeyError, IndexError or OSError where the file does not keep to the format.
+    InputError with the line of what cannot be read; ValueError for what is no such file.
     """
     import meshio
 
-    read = _Reader()
-    parts: dict[str, _Reader] = {}
-    now = read  # what the blocks belong to: a part, an instance, or all else
-    for keyword, options, rows in _blocks(path, 0):
-        if keyword == "part":
-            now = parts[options["name"].lower()] = _Reader()
-        elif keyword == "instance":
-            now = _instance(parts, options, rows)
-        elif keyword == "end instance":
-            read.add(now)
-            now = read
-        elif keyword == "end part":
-            now = read
-        elif keyword in KEYWORDS:
-            getattr(now, keyword)(options, rows)
-    if not read.blocks and (parts or read.passed):
-        passed = f"; {', '.join(sorted(read.passed))} are passed over" if read.passed else ""
-        raise ValueError(f"no element of a body is in it or in an instance of its parts{passed}")
-    read.name_sets()
-    blocks = read.blocks + read.facets()
-    tags = sorted(read.nodes)
-    points = np.array([read.nodes[tag] for tag in tags]).reshape(-1, 3)
-    cells = [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in blocks]
+    whole, parts = Scope(), dict[str, Scope]()
+    now, opened = whole, dict[str, Block]()
+    for block in blocks(path):
+        verb, what = ("end", block.keyword[3:]) if block.keyword[:3] == "end" else ("", "")
+        if block.keyword == "part":
+            now = parts[bare(block.need("name"))] = Scope()
+        elif block.keyword == "instance":
+            now = _instance(parts, block)
+        elif what == "instance" and "instance" in opened:
+            whole.add(now)
+            now = whole
+        elif what == "part":
+            now = whole
+        elif not verb and block.keyword != "assembly":
+            getattr(now, block.keyword)(block)
+        block.rows = []
+        if verb and opened.pop(what, None) is None:
+            raise block.fail(f"there is no *{what.upper()} that it ends")
+        if block.keyword in ("part", "assembly", "instance"):
+            opened[block.keyword] = block
+    for keyword, block in opened.items():
+        raise block.fail(f"the file ends before *END {keyword.upper()}")
+    for scope in (*parts.values(), whole):
+        scope.check()
+    if not any(kind for kind, _, _, _ in whole.blocks):
+        passed = f"; {', '.join(sorted(whole.passed))} are passed over" if whole.passed else ""
+        raise InputError(
+            f"mesh file '{path}': no element of a body is in it or in an instance of its"
+            f" parts{passed}."
+        )
+    whole.name_sets()
+    if whole.passed:
+        log.warning("%s: elements without extent are left out: %s", path, ", ".join(whole.passed))
+    cells = [(kind, nodes, ids) for kind, nodes, ids, _ in whole.blocks if kind] + whole.facets()
+    tags = np.array(sorted(whole.nodes), dtype=np.int64)
+    points = np.array([whole.nodes[tag] for tag in tags.tolist()]).reshape(-1, 3)
     of_cells = {
-        name: [_places(ids, found) for _, _, ids in blocks]
-        for name, found in read.element_sets.items()
+        name: [_places(ids, found) for _, _, ids in cells]
+        for name, found in whole.element_sets.items()
     }
-    of_points = {
-        name: np.searchsorted(tags, sorted(found & read.nodes.keys()))
-        for name, found in read.node_sets.items()
-    }
-    return meshio.Mesh(points, cells, cell_sets=of_cells, point_sets=of_points)
+    of_points = {n: np.searchsorted(tags, sorted(f)) for n, f in whole.node_sets.items()}
+    rows = [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in cells]
+    rows = [(k, in_order(points, n) if k == "hexahedron27" else n) for k, n in rows]
+    return meshio.Mesh(points, rows, cell_sets=of_cells, point_sets=of_points)
 
 
-def _places(ids: np.ndarray, found: set[int]) -> np.ndarray:
-    return np.flatnonzero(np.isin(ids, np.fromiter(found, int, len(found))))
+def _places(ids: np.ndarray, found: Iterable[int]) -> np.ndarray:
+    return np.flatnonzero(np.isin(ids, np.fromiter(found, np.int64)))
 
 
-def _instance(parts: dict[str, _Reader], options: dict[str, str], rows: list[list[str]]) -> _Reader:
+def _instance(parts: dict[str, Scope], block: Block) -> Scope:
     """A copy of a part, moved along the first row, then turned about the axis of the second."""
-    name, of = options["name"], options.get("part", "")
-    if of.lower() not in parts:
+    name, of = block.need("name"), block.need("part")
+    if bare(of) not in parts:
         known = ", ".join(parts) or "none"
-        raise ValueError(f"instance {name} is of part {of}, which is not there; parts: {known}")
-    made = deepcopy(parts[of.lower()])
-    made.name = name
-    numbers = [[float(word or 0) for word in row] for row in rows]
-    if numbers:
-        made.shift[: len(numbers[0])] = numbers[0]
-    if len(numbers) > 1:
-        *ends, angle = numbers[1]
-        first, last = np.reshape(ends, (2, 3))
-        axis = (last - first) / np.linalg.norm(last - first)
-        made.centre, made.turn = first, Rotation.from_rotvec(np.radians(angle) * axis)
+        raise block.fail(f"instance {name} is of part {of}, which is not there; parts: {known}")
+    made = parts[bare(of)].copy()
+    made.name, made.move = name, inp_generation.motion(block, block.rows)
     return made
 
 
-def _blocks(path: Path, depth: int) -> Iterator[tuple[str, dict[str, str], list[list[str]]]]:
-    """Keyword in lower case, options, rows of data of each block; included files in their place."""
-    keyword, rows, options = "", list[list[str]](), dict[str, str]()
-    if depth > DEEPEST:
-        raise ValueError("files include each other without end")
-    with path.open(errors="replace") as file:
-        for line in file:
-            if line.startswith("**") or not line.strip():
-                continue
-            if not line.startswith("*"):
-                rows.append([word.strip() for word in line.strip().rstrip(",").split(",")])
-                continue
-            yield keyword, options, rows
-            first, *words = line[1:].split(",")
-            keyword, rows = first.strip().lower(), []
-            pairs = (word.partition("=") for word in words)
-            options = {key.strip().lower(): value.strip().strip('"') for key, _, value in pairs}
-            if keyword == "include":
-                yield from _blocks(path.parent / options["input"], depth + 1)
-    yield keyword, options, rows
-
-
-class _Reader:
+class Scope:
     """What the blocks of a file, of a part or of an instance say.
 
     A method for each keyword that is read.
     """
 
-    def __init__(self) -> None:
-        self.nodes: dict[int, list[float]] = {}
-        # kind, numbers of nodes, numbers of elements
-        self.blocks: list[tuple[str, np.ndarray, np.ndarray]] = []
-        self.node_sets: dict[str, set[int]] = {}
-        self.element_sets: dict[str, set[int]] = {}
-        self.surfaces: dict[str, list[tuple[set[int], str]]] = {}
-        self.passed: set[str] = set()  # types of elements
-        self.instances: dict[str, tuple[_Reader, int, int]] = {}  # with what numbers grow by
-        self.name = ""
-        self.shift, self.centre, self.turn = np.zeros(3), np.zeros(3), Rotation.identity()
+    ngen, nfill, ncopy = inp_generation.ngen, inp_generation.nfill, inp_generation.ncopy
+    elgen, elcopy = inp_generation.elgen, inp_generation.elcopy
 
-    def add(self, own: _Reader) -> None:
+    def __init__(self) -> None:
+        self.nodes: dict[int, tuple[float, ...]] = {}
+        # kind ('' of those that are passed over), numbers of nodes, of elements, where each is
+        self.blocks: list[tuple[str, np.ndarray, np.ndarray, list[tuple[Block, int]]]] = []
+        self.types: dict[int, str] = {}  # type of each block
+        self.elements: set[int] = set()
+        self.node_sets: dict[str, Named] = {}
+        self.element_sets: dict[str, Named] = {}
+        self.unsorted: set[str] = set()
+        self.surfaces: dict[str, list[tuple[Iterable[int], str, Block, int]]] = {}
+        self.passed: dict[str, int] = {}  # types of elements
+        self.instances: dict[str, tuple[Scope, int]] = {}  # with what numbers grow by
+        self.name = ""
+        self.frame = np.zeros(3), Rotation.identity()  # of *SYSTEM: origin, directions
+        self.move: Any = None  # of an instance
+
+    def copy(self) -> Scope:
+        """A scope of the same contents, to which others can be added."""
+        made = copy(self)
+        for key, value in vars(self).items():
+            if isinstance(value, dict | list | set):
+                setattr(made, key, copy(value))
+        every: Any = (made.node_sets, made.element_sets, made.surfaces)
+        for sets in every:
+            sets.update({name: copy(own) for name, own in sets.items()})
+        return made
+
+    def add(self, own: Scope) -> None:
         """Add an instance at its place, with new numbers of its nodes and elements."""
-        nodes = 1 + max(self.nodes, default=0)
-        elements = 1 + max((int(ids.max(initial=0)) for _, _, ids in self.blocks), default=0)
-        self.instances[own.name.lower()] = own, nodes, elements
-        places = np.array(list(own.nodes.values())).reshape(-1, 3) + own.shift
-        places = own.turn.apply(places - own.centre) + own.centre
-        self.nodes |= zip((tag + nodes for tag in own.nodes), places.tolist())
-        self.passed |= own.passed
-        for kind, rows, ids in own.blocks:
-            self.blocks.append((kind, rows + nodes, ids + elements))
-            _set(self.element_sets, own.name).update((ids + elements).tolist())
+        own.check()
+        by = (len(self.instances) + 1) * LARGEST
+        self.instances[bare(own.name)] = own, by
+        places = own.move(np.array(list(own.nodes.values())).reshape(-1, 3))
+        self.nodes |= zip((tag + by for tag in own.nodes), map(tuple, places.tolist()))
+        self.elements.update(i + by for i in own.elements)
+        for name, count in own.passed.items():
+            self.passed[name] = self.passed.get(name, 0) + count
+        for number, (kind, nodes, ids, where) in enumerate(own.blocks):
+            self.types[len(self.blocks)] = own.types[number]
+            self.blocks.append((kind, np.where(nodes > 0, nodes + by, 0), ids + by, where))
+            set_of(self.element_sets, own.name).update(dict.fromkeys((ids + by).tolist()))
 
     def name_sets(self) -> None:
         """Unite the sets and surfaces of instances by their names. Where the assembly has one of
         that name itself, those of the instances are called INSTANCE.NAME.
         """
-        taken = [{n.lower() for n in s} for s in (self.node_sets, self.element_sets, self.surfaces)]
-        for own, nodes, elements in self.instances.values():
+        taken = [{bare(n) for n in s} for s in (self.node_sets, self.element_sets, self.surfaces)]
+        for own, by in self.instances.values():
 
-            def named(name: str, kind: int, own: _Reader = own) -> str:
-                return f"{own.name}.{name}" if name.lower() in taken[kind] else name
+            def named(name: str, kind: int, own: Scope = own) -> str:
+                return f"{own.name}.{name}" if bare(name) in taken[kind] else name
 
             for name, found in own.node_sets.items():
-                _set(self.node_sets, named(name, 0)).update(tag + nodes for tag in found)
+                set_of(self.node_sets, named(name, 0)).update(dict.fromkeys(n + by for n in found))
             for name, found in own.element_sets.items():
-                _set(self.element_sets, named(name, 1)).update(i + elements for i in found)
+                set_of(self.element_sets, named(name, 1)).update(
+                    dict.fromkeys(n + by for n in found)
+                )
             for name, rows in own.surfaces.items():
-                moved = [({i + elements for i in found}, face) for found, face in rows]
-                self.surfaces.setdefault(named(name, 2), []).extend(moved)
+                moved = [([i + by for i in found], *rest) for found, *rest in rows]
+                self.surfaces.setdefault(named(name, 2), []).extend(moved)  # type: ignore[arg-type]
 
-    def node(self, options: dict[str, str], rows: list[list[str]]) -> None:
-        for row in rows:
-            place = [float(word or 0) for word in row[1:4]]
-            self.nodes[int(row[0])] = place + [0.0] * (3 - len(place))
-        if "nset" in options:
-            _set(self.node_sets, options["nset"]).update(int(row[0]) for row in rows)
+    def check(self) -> None:
+        """Raise InputError with the line of what names a node or element that is not there. Ranges
+        may have gaps, which are left out.
+        """
+        known = np.fromiter(self.nodes, np.int64)
+        for kind, nodes, _, where in self.blocks:
+            lost = np.argwhere(~np.isin(nodes, known) & (nodes > 0 if not kind else True))
+            if len(lost):
+                block, line = where[lost[0, 0]]
+                raise block.fail(
+                    f"an element {block.options.get('type', '')} names a node that is not there,"
+                    f" {nodes[tuple(lost[0])]}",
+                    line,
+                )
+        both: Any = ((self.node_sets, self.nodes, "node"), (self.element_sets, self.elements, ""))
+        for sets, there, what in both:
+            for name, found in sets.items():
+                for number in [number for number in found if number not in there]:
+                    if found[number] is not None:
+                        block, line = found[number]
+                        word = f"{what or 'element'} {number % LARGEST}"
+                        raise block.fail(f"'{name}' names {word}, which is not there", line)
+                    del found[number]
 
-    def element(self, options: dict[str, str], rows: list[list[str]]) -> None:
-        named = options["type"].upper()
-        own = _set(self.element_sets, options["elset"]) if "elset" in options else set()
-        fits = ((pattern.match(named), kinds) for pattern, kinds in FAMILIES)
-        found, kinds = next((fit for fit in fits if fit[0]), (None, {}))
-        if found is None:
-            self.passed.add(named)
-            return
-        if found[1] not in kinds:
-            raise ValueError(f"elements of type {named} are not known")
-        kind, count = kinds[found[1]]
-        words = np.array([word for row in rows for word in row], dtype=np.int64)
-        words = words.reshape(-1, 1 + count)
-        self.blocks.append((kind, words[:, 1:], words[:, 0]))
-        if not set(words[:, 1:].ravel().tolist()) <= self.nodes.keys():
-            raise ValueError(f"an element {options['type']} names a node that is not there")
-        own.update(words[:, 0].tolist())
+    def system(self, block: Block) -> None:
+        """Coordinates of nodes are from now on those in other directions from another origin."""
+        values = [[block.real(line, word) for word in words] for line, words in block.rows]
+        first, second = [*values, [], []][:2]
+        if len(first) not in (0, 3, 6) or len(second) not in (0, 3) or len(values) > 2:
+            raise block.fail("*SYSTEM needs three or six coordinates, and three more or none")
+        origin, turn = np.array(first[:3] or [0.0] * 3), Rotation.identity()
+        if len(first) == 6:
+            x = np.array(first[3:]) - origin
+            z = np.cross(x, np.array(second) - origin) if second else np.array([0.0, 0.0, 1.0])
+            x = x if second else x * [1, 1, 0]
+            if not np.any(x) or not np.any(z):
+                raise block.fail("the axes of *SYSTEM have no direction")
+            x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+            turn = Rotation.from_matrix(np.stack([x, np.cross(z, x), z], axis=1))
+        self.frame = origin, turn
 
-    def nset(self, options: dict[str, str], rows: list[list[str]]) -> None:
-        mine = _set(self.node_sets, options["nset"])
-        self._extend(mine, "node_sets", options, rows)
-        if "elset" in options:
-            of = self._numbers(options["elset"], "element_sets", "")
-            for _, nodes, ids in self.blocks:
-                mine.update(nodes[_places(ids, of)].ravel().tolist())
+    def places(self, block: Block, rows: list[list[float]]) -> np.ndarray:
+        """Places (n, 3) from coordinates, which may be those of a cylinder, in the frame."""
+        x = np.array(rows, dtype=float).reshape(-1, 3)
+        kind = block.options.get("system", "R").upper()
+        if kind == "C":
+            angle = np.radians(x[:, 1])
+            x[:, :2] = (x[:, 0] * [np.cos(angle), np.sin(angle)]).T
+        elif kind not in ("R", "RC"):
+            raise block.fail(f"coordinates of SYSTEM={kind} are not known here; write them as R")
+        origin, turn = self.frame
+        return np.asarray(turn.apply(x) + origin if len(x) else x)
 
-    def elset(self, options: dict[str, str], rows: list[list[str]]) -> None:
-        self._extend(_set(self.element_sets, options["elset"]), "element_sets", options, rows)
+    def node(self, block: Block) -> None:
+        tags, rows = list[int](), list[list[float]]()
+        for line, words in block.rows:
+            if len(words) > 7:
+                raise block.fail("a node has a number and up to three coordinates", line)
+            tags.append(block.whole(line, words[0]))
+            rows.append([block.real(line, word) for word in (*words[1:4], "", "", "")[:3]])
+            if tags[-1] < 1:
+                raise block.fail("numbers of nodes begin with 1", line)
+        made = dict(zip(tags, map(tuple, self.places(block, rows).tolist())))
+        changed = [tag for tag in made if self.nodes.get(tag, made[tag]) != made[tag]]
+        changed += [] if len(made) == len(tags) else ["of one block"]  # type: ignore[list-item]
+        if changed:
+            said = "%s, line %d: nodes get another place, the first is %s; the last place counts"
+            log.warning(said, block.path, block.line, changed[0])
+        self.nodes |= made
+        if "nset" in block.options:
+            set_of(self.node_sets, block.need("nset")).update(dict.fromkeys(made))
 
-    def surface(self, options: dict[str, str], rows: list[list[str]]) -> None:
-        kind, name = options.get("type", "element").lower(), options["name"]
-        if kind == "node":
-            mine = _set(self.node_sets, name)
-            self._extend(mine, "node_sets", {}, [row[:1] for row in rows])
-        elif kind == "element":
-            self.surfaces[name] = [
-                (self._numbers(row[0], "element_sets", ""), row[1] if len(row) > 1 else "")
-                for row in rows
-            ]
+    def element(self, block: Block) -> None:
+        named = block.need("type").upper()
+        try:
+            kind, count = kind_of(named)
+        except ValueError as error:
+            raise block.fail(str(error)) from None
+        rows, where = list[list[int]](), list[tuple[Block, int]]()
+        for line, words in block.rows:
+            if not rows or not kind or len(rows[-1]) == 1 + count:
+                rows.append([])
+                where.append((block, line))
+            rows[-1] += [block.whole(line, word) for word in words]
+            if kind and len(rows[-1]) > 1 + count:
+                raise block.fail(f"an element {named} has a number and {count} nodes", line)
+        if kind and rows and len(rows[-1]) < 1 + count:
+            raise block.fail(f"an element {named} lacks some of its {count} nodes", where[-1][1])
+        width = max((len(row) for row in rows), default=1)
+        table = np.array([row + [0] * (width - len(row)) for row in rows], dtype=np.int64)
+        table = table.reshape(-1, width)
+        if kind == "line3":  # the middle is in the middle here, and at the end in meshio
+            table = table[:, [0, 1, 3, 2]]
+        if kind in CORNERS:
+            table = table[:, : 1 + CORNERS[kind]]
+        if not kind:
+            self.passed[named] = self.passed.get(named, 0) + len(rows)
+        self.append(named, table[:, 1:], table[:, 0], where)
+        if "elset" in block.options:
+            own = set_of(self.element_sets, block.need("elset"))
+            own.update(dict.fromkeys(table[:, 0].tolist()))
 
-    def _extend(
-        self, mine: set[int], sets: str, options: dict[str, str], rows: list[list[str]]
+    def append(
+        self, named: str, nodes: np.ndarray, ids: np.ndarray, where: list[tuple[Block, int]]
     ) -> None:
-        """Add to a set what rows name: numbers, ranges or other sets."""
-        instance = options.get("instance", "")
-        for row in rows:
-            if "generate" in options:
-                first, last, *step = (int(word) for word in row)
-                words = [str(number) for number in range(first, last + 1, *step)]
-            else:
-                words = row
-            for word in filter(None, words):
-                mine.update(self._numbers(word, sets, instance))
+        """Add elements of a type, whose numbers must be new."""
+        for number, (block, line) in zip(ids.tolist(), where):
+            if number < 1 or number in self.elements:
+                fault = "is there twice" if number > 0 else "has a number below 1"
+                raise block.fail(f"element {number} {fault}", line)
+            self.elements.add(number)
+        self.types[len(self.blocks)] = named
+        self.blocks.append((kind_of(named)[0], nodes, ids, where))
 
-    def _numbers(self, word: str, sets: str, instance: str) -> set[int]:
+    def nset(self, block: Block) -> None:
+        mine = set_of(self.node_sets, block.need("nset"))
+        if "elset" in block.options:
+            of = self.numbers(block.need("elset"), "element_sets", block)
+            for _, nodes, ids, _ in self.blocks:
+                own = nodes[_places(ids, of)].ravel().tolist()
+                mine.update(dict.fromkeys(node for node in own if node))
+        else:
+            self._extend(mine, "node_sets", block)
+        if "unsorted" in block.options:
+            self.unsorted.add(bare(block.options["nset"]))
+
+    def elset(self, block: Block) -> None:
+        self._extend(set_of(self.element_sets, block.need("elset")), "element_sets", block)
+
+    def surface(self, block: Block) -> None:
+        kind, name = block.options.get("type", "element").lower(), block.need("name")
+        if kind == "node":
+            block.rows = [(line, words[:1]) for line, words in block.rows]
+            self._extend(set_of(self.node_sets, name), "node_sets", block)
+        elif kind == "element":
+            shown = next((own for own in self.surfaces if bare(own) == bare(name)), name)
+            for line, words in block.rows:
+                label = words[1].upper() if len(words) > 1 else ""
+                found = self.numbers(words[0], "element_sets", block, line)
+                rows = self.surfaces.setdefault(shown, [])
+                rows.append((list(found), label, block, line))
+        else:
+            log.info("%s: surface %s of type %s is no part of a mesh", block.path, name, kind)
+
+    def _extend(self, mine: Named, sets: str, block: Block) -> None:
+        """Add to a set what rows name: numbers, ranges or other sets."""
+        for line, words in block.rows:
+            if "generate" not in block.options:
+                for word in filter(None, words):
+                    mine.update(self.numbers(word, sets, block, line))
+                continue
+            first, last, *step = (block.whole(line, word) for word in words if word)
+            if len(step) > 1 or last < first or (step or [1])[0] < 1:
+                raise block.fail("a range needs its first and last number and a step", line)
+            by = self._of_instance(block, line)[1]
+            mine.update(dict.fromkeys(n + by for n in range(first, last + 1, *step)))
+            ends: Named = dict.fromkeys((first + by, last + by), (block, line))
+            mine.update(ends)
+
+    def _of_instance(self, block: Block, line: int | None) -> tuple[Scope, int]:
+        name = block.options.get("instance", "")
+        if name and bare(name) not in self.instances:
+            raise block.fail(f"there is no instance {name}", line)
+        return self.instances[bare(name)] if name else (self, 0)
+
+    def numbers(self, word: str, sets: str, block: Block, line: int | None = None) -> Named:
         """What a word stands for: a number or a set, of an instance if it is INSTANCE.WORD."""
+        own, by = self._of_instance(block, line)
         before, dot, after = word.partition(".")
-        if not instance and dot and before.lower() in self.instances:
-            instance, word = before, after
-        if instance:
-            if instance.lower() not in self.instances:
-                raise ValueError(f"there is no instance {instance}")
-            own, *grow = self.instances[instance.lower()]
-            by = grow[sets == "element_sets"]
-            return {number + by for number in own._numbers(word, sets, "")}
-        if word.lstrip("-").isdigit():
-            return {int(word)}
-        known = getattr(self, sets)
-        if all(name.lower() != word.lower() for name in known):
-            raise ValueError(f"there is no set {word} of {sets.split('_')[0]}s")
-        return _set(known, word)
+        if own is self and dot and bare(before) in self.instances:
+            own, by = self.instances[bare(before)]
+            word = after
+        if word.isdigit():
+            return {block.whole(line or block.line, word) + by: (block, line or block.line)}
+        known = {bare(name): found for name, found in getattr(own, sets).items()}
+        if bare(word) not in known:
+            raise block.fail(f"there is no set {word} of {sets.split('_')[0]}s", line)
+        return {number + by: where for number, where in known[bare(word)].items()}
 
     def facets(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Blocks of facets that stand for the surfaces, whose numbers are new.
-
-        A surface of elements without the number of a face has all of them.
-        """
+        """Blocks of facets that stand for the surfaces, whose numbers are new."""
         made = []
-        new = 1 + max((int(ids.max(initial=0)) for _, _, ids in self.blocks), default=0)
+        most = max(dimension(named) for named in self.types.values())
+        new = 1 + max(self.elements)
         for name, rows in self.surfaces.items():
-            for members, face in rows:
-                for kind, nodes, ids in self.blocks:
-                    faces = FACES.get(kind.rstrip("0123456789"), ())
-                    chosen = faces if not face else ()
-                    if face[1:].isdigit():
-                        chosen = faces[int(face[1:]) - 1 : int(face[1:])]
-                    own = nodes[_places(ids, members)]
-                    for corners in (own[:, list(ends)] for ends in chosen if len(own)):
-                        made.append((FACET[corners.shape[1]], corners, new + np.arange(len(own))))
-                        _set(self.element_sets, name).update(made[-1][2].tolist())
-                        new += len(own)
+            for members, label, block, line in rows:
+                for number in members:
+                    if number not in self.elements:
+                        word = f"element {number % LARGEST}"
+                        raise block.fail(f"surface '{name}' names {word}, which is not there", line)
+                sides = self._sides(members, label, block, line, most)
+                for corners in sides if label else _free(sides):
+                    ids = new + np.arange(len(corners))
+                    made.append((FACET[corners.shape[1]], corners, ids))
+                    set_of(self.element_sets, name).update(dict.fromkeys(ids.tolist()))
+                    new += len(corners)
         return made
 
+    def _sides(
+        self, members: Iterable[int], label: str, block: Block, line: int, dim: int
+    ) -> list[np.ndarray]:
+        """Corners of the sides of elements that a row of a surface means."""
+        found = []
+        for place, (_, nodes, ids, _) in enumerate(self.blocks):
+            own = nodes[_places(ids, members)]
+            sides = side_of(self.types[place], label, dim) if len(own) else ()
+            if sides is None:
+                what = label or "that could be meant"
+                raise block.fail(f"an element {self.types[place]} has no side {what}", line)
+            found += [own[:, list(side)] for side in sides]
+        return found
 
-def _set(sets: dict[str, set[int]], name: str) -> set[int]:
-    """The set of that name, whatever the case of its letters; a new one if there is none."""
-    known = next((other for other in sets if other.lower() == name.lower()), name)
-    return sets.setdefault(known, set())
+
+def _free(sides: list[np.ndarray]) -> list[np.ndarray]:
+    """Those sides that belong to one element alone, by their number of corners."""
+    made = []
+    for width in {own.shape[1] for own in sides}:
+        corners = np.concatenate([own for own in sides if own.shape[1] == width])
+        keys = np.sort(corners, axis=1)
+        _, place, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        made.append(corners[count[place.ravel()] == 1])
+    return made

@@ -51,8 +51,9 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     -------
     Triangles, quadrilaterals, tetrahedra or hexahedra, curved where the file holds elements of
         second order. Its boundaries are the groups of facets on its surface, and the groups of
-        nodes that hold all corners of such facets. InputError if the file cannot be read, if there
-        is no such group, or if the mesh has a fault that cannot be repaired.
+        nodes that hold all corners of such facets and no node inside the body. InputError if the
+        file cannot be read, if there is no such group, or if the mesh has a fault that cannot be
+        repaired.
     """
     check_number("the scale of a mesh", scale, low=0.0)
     return _body(Path(path), read_groups(Path(path)), group, scale)
@@ -202,14 +203,20 @@ def _elements(
                 " quadrilaterals, tetrahedra or hexahedra of first or second order."
             )
     if len(found) != 1:
-        choice = "" if group is not None or bodies == "none" else ", or choose one of its groups: "
+        pure = [n for n in groups.names(dim) if group is None and len(_kinds(groups, n, dim)) == 1]
+        choice = f", or choose one of its groups: {', '.join(pure)}" if pure else ""
         raise InputError(
             f"mesh file '{path}': the body mixes elements of type {' and '.join(found)}; make all"
-            f" of one type{choice}{bodies if choice else ''}."
+            f" of one type{choice}."
         )
     ((kind, parts),) = found.items()
     nodes, numbers = (np.concatenate(each) for each in zip(*parts))
     return complete(Cells(path, kind, points, nodes.T.astype(np.int64), numbers))
+
+
+def _kinds(groups: FileGroups, name: str, dim: int) -> set[str]:
+    """The types of the elements of a group."""
+    return {groups.blocks[i][0] for i, own in groups.members[name, dim].items() if len(own)}
 
 
 def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
@@ -253,18 +260,32 @@ def _boundaries(
     place = {tuple(facet): i for i, facet in enumerate(corners.T.tolist())}
     found: dict[str, np.ndarray] = {}
     for name in groups.names(dim - 1):
-        hits = []
+        hits, others = [], list[tuple[int, ...]]()
         for i, elements in groups.members[name, dim - 1].items():
             kind, nodes, _ = groups.blocks[i]
             count = 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])
             facets = np.sort(number[nodes[elements][:, :count]], axis=1)
-            hits += [place[key] for key in map(tuple, facets.tolist()) if key in place]
+            keys = [key for key in map(tuple, facets.tolist()) if key[0] >= 0]
+            hits += [place[key] for key in keys if key in place]
+            others += [key for key in keys if key not in place]
+        if others and (inside := len(_inner(mesh).intersection(others))):
+            said = "%d facets of %s lie inside the body: no boundary of it holds them"
+            log.warning(said, inside, name)
         if hits:
             found[name] = outer[np.unique(hits)]
+    skin = np.isin(np.arange(mesh.nvertices), corners)
     for name, nodes in groups.point_sets.items():
-        there = np.zeros(mesh.p.shape[1] + 1, dtype=bool)
-        there[number[nodes]] = True  # nodes of other bodies go to the last place
+        own = number[nodes]  # those of other bodies are -1, those within edges come last
+        there = np.zeros(mesh.nvertices, dtype=bool)
+        there[own[(own >= 0) & (own < mesh.nvertices)]] = True
         inside = np.all(there[corners], axis=0)
-        if inside.any() and name not in found:
+        if np.any(there & ~skin):
+            log.info("the nodes %s fill the body, or a part of it: they are no boundary", name)
+        elif inside.any() and name not in found:
             found[name] = outer[inside]
     return found
+
+
+def _inner(mesh: skfem.Mesh) -> set[tuple[int, ...]]:
+    """The corners of the facets between two elements."""
+    return set(map(tuple, np.sort(mesh.facets[:, mesh.f2t[1] >= 0], axis=0).T.tolist()))

@@ -21,20 +21,27 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
+from contactopt.meshes.bulk_data import read_bulk_data
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
-from contactopt.meshes.msh4 import read_msh4, version
+from contactopt.meshes.med import read_med
+from contactopt.meshes.msh4 import parametric, read_msh4, read_parametric, version
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
 TAGS = (
-    *("gmsh:physical", "medit:ref", "cell_tags", "su2:tag", "nastran:ref"),
+    *("gmsh:physical", "medit:ref", "su2:tag", "nastran:ref"),
     *("avsucd:material", "flac3d:group", "netgen:index"),
 )
 # formats whose readers end on damaged text; others may not
 SAFE = ("gmsh", "vtu", "vtk", "abaqus", "xdmf", "medit", "nastran", "med", "netgen", "avsucd")
 # formats of which meshio loses names or sets -> our reader
-OWN: dict[str, Callable[[Path], Any]] = {"abaqus": read_inp, "exodus": read_exodus}
+OWN: dict[str, Callable[[Path], Any]] = {
+    "abaqus": read_inp,
+    "exodus": read_exodus,
+    "med": read_med,
+    "nastran": read_bulk_data,
+}
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
 CHILD = """import contextlib, pickle, sys, meshio
@@ -100,16 +107,20 @@ def read_groups(path: Path) -> FileGroups:
                 own = [f"{tag}" if key in TAGS else f"{key}={tag}"]
                 if key == "gmsh:physical":
                     own = [named.get((int(tag), blocks[i][2]), own[0])]
-                elif key == "cell_tags":  # of MED: families of elements that share their groups
-                    own = mesh.cell_tags.get(tag, own)
                 for name in own if tag != 0 or key not in TAGS else ():
                     add(name, i, np.flatnonzero(values == tag))
     sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
-    families = mesh.point_data.get("point_tags", np.zeros(0))
-    for tag, own in getattr(mesh, "point_tags", {}).items():
-        for name in own:
-            there = np.flatnonzero(families == tag)
-            sets[name] = np.union1d(sets.get(name, there), there)
+    for name, found in sets.items():
+        if found.size and (found.min() < 0 or found.max() >= len(mesh.points)):
+            raise InputError(
+                f"mesh file '{path}': the set {name!r} names a node that is not there."
+            )
+    for (name, _), parts in members.items():
+        for i, found in parts.items():
+            if found.min() < 0 or found.max() >= len(blocks[i][1]):
+                raise InputError(
+                    f"mesh file '{path}': the set {name!r} names an element that is not there."
+                )
     return FileGroups(np.asarray(mesh.points), blocks, members, sets)
 
 
@@ -139,8 +150,11 @@ def _read(path: Path) -> Any:
         try:  # on a damaged file readers raise anything, print what is wrong, and end the process
             with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
                 return reader()
+        except InputError:  # it names what it does not read
+            raise
         except (Exception, SystemExit) as error:
             text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
+            text = f"{error} in it is not known" if isinstance(error, KeyError) else text
             said = said or " ".join(text.split())[:200] or type(error).__name__
     advice = "; save Gmsh files as text in version 4.1 or 2.2" if "gmsh" in formats else ""
     raise InputError(
@@ -161,6 +175,9 @@ def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[],
         )
     if stated == "4.1":
         yield partial(read_msh4, path)
+        return
+    if stated is not None and parametric(path):
+        yield partial(read_parametric, path)
         return
     if binary:  # meshio trusts the counts of damaged files
         yield partial(_read_apart, path, "gmsh", size)

@@ -88,17 +88,39 @@ def complete(cells: Cells) -> Cells:
     if cells.kind not in COMPLETE:
         return cells
     c = cells.points[:, cells.nodes]
-    new = [
-        c[:, list(b)].sum(axis=1) / 2 - c[:, list(a)].sum(axis=1) / 4 for a, b in _SIDES[cells.kind]
-    ]
-    if cells.kind == "hexahedron20":
-        new.append(c[:, 8:].sum(axis=1) / 4 - c[:, :8].sum(axis=1) / 4)
+    new = middles(cells.kind, c)
     extra = cells.points.shape[1] + np.arange(len(new) * c.shape[2]).reshape(len(new), -1)
     points = np.concatenate([cells.points, *new], axis=1)
     nodes = np.concatenate([cells.nodes, extra])
     made = replace(cells, kind=COMPLETE[cells.kind], points=points, nodes=nodes)
     # neighbours share the middle of their side
     return replace(made, nodes=representatives(made, repair=False)[nodes])
+
+
+def middles(kind: str, places: np.ndarray) -> list[np.ndarray]:
+    """Where the nodes (dim, v, e) of serendipity elements put the middles (dim, e) of their sides,
+    and of a hexahedron its own, in the order of meshio.
+    """
+    new = [
+        places[:, list(b)].sum(axis=1) / 2 - places[:, list(a)].sum(axis=1) / 4
+        for a, b in _SIDES[kind]
+    ]
+    if kind == "hexahedron20":
+        new.append(places[:, 8:20].sum(axis=1) / 4 - places[:, :8].sum(axis=1) / 4)
+    return new
+
+
+def in_order(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """The nodes (e, 27) of hexahedra whose last seven come in an order that formats do not agree
+    about, in that of meshio: each lies nearest to the middle that it is. ValueError if one is not.
+    """
+    places = points[nodes].transpose(2, 1, 0)
+    wanted = np.stack(middles("hexahedron20", places), axis=1)
+    apart = np.linalg.norm(wanted[:, :, None] - places[:, None, 20:], axis=0)  # (7, 7, e)
+    nearest = np.argmin(apart, axis=1).T
+    if np.any(np.sort(nearest, axis=1) != np.arange(7)):
+        raise ValueError("the nodes in the faces of a hexahedron of 27 nodes lie at wrong places")
+    return np.concatenate([nodes[:, :20], np.take_along_axis(nodes[:, 20:], nearest, 1)], axis=1)
 
 
 def representatives(cells: Cells, repair: bool = True) -> np.ndarray:

@@ -31,6 +31,12 @@ def version(path: Path) -> tuple[str | None, bool]:
     return None, False
 
 
+def parametric(path: Path) -> bool:
+    """Whether a file of version 2 has parametric nodes."""
+    with path.open("rb") as file:
+        return any(line.startswith(b"$ParametricNodes") for line in file)
+
+
 def read_msh4(path: Path) -> Any:
     """The mesh of a file with the physical groups as sets of elements by name. ValueError or
     KeyError where the file ends early or breaks the format.
@@ -54,6 +60,45 @@ def read_msh4(path: Path) -> Any:
         sizes = (len(nodes) if group in own else 0 for (_, nodes), own in zip(blocks, members))
         sets[group] = [np.arange(size) for size in sizes]
     return _mesh(points, tags, blocks, sets)
+
+
+def read_parametric(path: Path) -> Any:
+    """The mesh of a file of version 2 whose nodes have parameters on their entities, as the option
+    Mesh.SaveParametric writes them in text; meshio reads the others. Errors as above.
+    """
+    if version(path)[1]:
+        raise ValueError("it has parametric nodes in binary; save it without Mesh.SaveParametric")
+    sections = _sections(path)
+    names, reader = _names(sections), sections["ParametricNodes"]
+    tags, points = [], []
+    for _ in range(reader.count()):
+        tag, x, y, z, dim, _ = reader.take(6, "f8").tolist()
+        tags.append(int(tag))
+        points.append((x, y, z))
+        reader.take(int(dim) % 3, "f8")  # none within a volume
+    blocks: dict[tuple[int, str], list[np.ndarray]] = {}
+    reader = sections["Elements"]
+    for _ in range(reader.count()):
+        kind, count = reader.take(3).tolist()[1:]
+        group = int(reader.take(count)[0]) if count else 0
+        nodes = reader.take(_nodes_of(kind))
+        dim = _dimension_of(kind)
+        name = names.get((dim, group), str(group)) if group else ""
+        blocks.setdefault((kind, name), []).append(nodes)
+    rows = [(kind, np.array(nodes)) for (kind, _), nodes in blocks.items()]
+    sets = {
+        name: [np.arange(len(n) if own == name else 0) for (_, own), n in blocks.items()]
+        for name in dict.fromkeys(name for _, name in blocks if name)
+    }
+    return _mesh(np.array(points), np.array(tags), rows, sets)
+
+
+def _dimension_of(kind: int) -> int:
+    """Dimension of an element of a kind of Gmsh."""
+    from meshio._mesh import topological_dimension
+    from meshio.gmsh.common import _gmsh_to_meshio_type
+
+    return int(topological_dimension[_gmsh_to_meshio_type[kind]])
 
 
 def _nodes_of(kind: int) -> int:
@@ -125,7 +170,9 @@ def _sections(path: Path) -> dict[str, Any]:
     order = ">" if one == b"\0\0\0\1" else "<"
     if binary and data.split(maxsplit=4)[3] != b"8":
         raise ValueError("its numbers are not of eight bytes")
-    for name in ("PhysicalNames", "Entities", "Nodes", "Elements"):
+    if b"$PartitionedEntities" in data:
+        raise ValueError("it is a partitioned mesh; save it in one piece")
+    for name in ("PhysicalNames", "Entities", "ParametricNodes", "Nodes", "Elements"):
         start = data.find(f"${name}".encode())
         if start >= 0:
             start = data.index(b"\n", start) + 1
@@ -133,7 +180,7 @@ def _sections(path: Path) -> dict[str, Any]:
             part = data[start : end if end >= 0 else None]
             in_text = name == "PhysicalNames" or not binary
             found[name] = _Numbers(part) if in_text else _Bytes(part, order)
-        elif name in ("Nodes", "Elements"):
+        elif name == "Elements" or (name == "Nodes" and "ParametricNodes" not in found):
             raise ValueError(f"it has no section ${name}")
     return found
 

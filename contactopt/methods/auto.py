@@ -15,15 +15,13 @@ proximal loop.
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
    A tree over the states of the contacts looks for a solution or for such a proof
    (contactopt.methods.kernels.states), BRANCHES of it here, and twice as many after each round of
-   stages 6 and 7.
-4. The path that turns back where it must (contactopt.methods.kernels.homotopy), at most TURNING
-   linear systems of it.
-5. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
-6. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
+   stages 5 and 6.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
+5. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
    early says nothing of the next; then the proximal loop from the best of all points, its weight
    falling slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved
    the residual, the same again on other paths, with twice the patience.
-7. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
+6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
    residual, twice as many after each restart, the loop starts again from contact forces drawn at
    random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
@@ -49,7 +47,6 @@ from contactopt.methods import NoSolution, Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
 from contactopt.methods.kernels.gauss_seidel import Sweeps
-from contactopt.methods.kernels.homotopy import homotopy_iterates
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.methods.kernels.states import StateTree, can
@@ -81,10 +78,8 @@ NO_PROGRESS_JAMMED = (
 class Auto(Method):
     """The default method. It has no number to choose.
 
-    Parameters
-    ----------
-    preconditioner : Of Newton's steps where Q is known by its products: a name in
-        contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
+    `preconditioner` is that of Newton's steps where Q is known by its products: a name in
+    contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
     """
 
     preconditioner: str | None = None
@@ -142,7 +137,7 @@ class _Swept:
 
     def points(self, most: int, budget: float) -> Iterator[Iterate]:
         """Points that `most` sweeps reach within a number of multiplications, if they converge: the
-        second has all digits, and the first most of them where each sweep is dear.
+        second has all digits, and the first most of them where each sweep is expensive.
         """
         problem = self.problem
         explicit = isinstance(problem.Q, np.ndarray) or sp.issparse(problem.Q)
@@ -216,17 +211,15 @@ class _Robust:
         if infeasibility(problem) is not None:  # the driver says so
             return
         yield from self.searched(constants.BRANCHES)
-        if self.conic:
-            turning = homotopy_iterates(problem, self.matrix, constants.TURNING)
-            reached = yield from self.interior(reached, turning)
-            if problem.symmetric and not self.loose:
-                reached = yield from self.cones(reached)
+        if self.conic and problem.symmetric and not self.loose:
+            reached = yield from self.cones(reached)
         yield from self.jammed(reached) if self.loose else self.restarted(reached)
 
     def searched(self, branches: int) -> Iterator[Iterate | Known]:
         """The points among the next branches of the tree; NoSolution if it ends without any."""
         if self.tree is None or self.tree.done:
             return
+        branches = min(branches, int(constants.BRANCH_WORK / self.problem.contacts**3))
         for found in islice(self.branches, branches):
             if found is not None:
                 self.met = True
@@ -250,11 +243,6 @@ class _Robust:
         """Paths drawn at random and the gentle proximal loop from the best point, without end."""
         problem, matrix, random = self.problem, self.matrix, np.random.default_rng(0)
         for restarts in count():
-            if self.conic and restarts:
-                turning = homotopy_iterates(
-                    problem, matrix, constants.TURNING * 2**restarts, random
-                )
-                reached = yield from self.interior(reached, turning)
             for _ in range(constants.PATHS if self.conic else 0):
                 path = Path.random(random, problem.contacts)
                 points = interior_iterates(problem, matrix, path)

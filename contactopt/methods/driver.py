@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.checks import check_number, real_array
+from contactopt.checks import check_number
+from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
 from contactopt.linear.stacked import Stacked
 from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
 from contactopt.methods.auto import Auto
-from contactopt.methods.method import Iterate, Known, Method, at_rest
+from contactopt.methods.method import Iterate, Known, Method, at_rest, dimensionless_start
 from contactopt.methods.notes import collected, remark
 from contactopt.methods.small import solve_small
 from contactopt.problem import (
@@ -32,9 +33,9 @@ from contactopt.problem import (
     natural_map_residual,
 )
 from contactopt.problem.certificate import Moved
+from contactopt.problem.feasibility import held_apart
 from contactopt.problem.unbalanced_loads import check_equilibrium
 
-TOL = 1e-8  # largest certificate of an answer that counts as solved, unless another is asked for
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
@@ -43,6 +44,7 @@ FAR = 0.1  # residual above which a method that works for long may be at one wit
 DOUBT, DEARER = 3, 0.25  # iterates before the proof is first looked for, and more per unknown
 SAME = 1e-11  # relative distance at which two iterates are the same state
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
+LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
 CONFIRM = 8  # repeated states in a row of a method that goes nowhere
 
 
@@ -173,12 +175,12 @@ def _run(
     scales = scales if stretch is None else replace(scales, stretch=stretch)
     if swept is not None:
         scaled.__dict__["swept"] = swept / scales.force
-    first = None if start is None else _dimensionless_start(start, problem, scales)
+    first = None if start is None else dimensionless_start(start, problem, scales)
     recorder = _Recorder(problem, scales, limits, first or at_rest(scaled))
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
     if not recorder.history:
         recorder.certify([])
-    if getattr(method, "wanders", False):
+    if getattr(method, "wanders", False) or recorder.lost:
         recorder.return_to_best()
     status = Status.SOLVED if recorder.residual <= limits.tol else ended or Status.INFEASIBLE
     if proof is None and status is not Status.SOLVED and recorder.residual > CLOSE:
@@ -205,9 +207,10 @@ def _follow(
     steps: Iterator[Iterate | Known], scaled: InterfaceProblem, recorder: _Recorder
 ) -> tuple[Status | None, str, Infeasible | None]:
     """Take iterates until they end, or a proof ends them: how, why, and the proof."""
-    ended: Status | None = None
     repeated: Status | None = None
-    message, proof, doubt = "", None, DOUBT + DEARER * scaled.q.size
+    proof = held_apart(recorder.problem)
+    message, doubt = "", DOUBT + DEARER * scaled.q.size
+    ended = None if proof is None else Status.INFEASIBLE
     while ended is None:
         begin = time.perf_counter()
         iterate, ended, message, proof = _next(steps, recorder.left(), repeated, recorder.enough)
@@ -215,7 +218,7 @@ def _follow(
         repeated = None
         if iterate is not None:
             ended = recorder.record(iterate, _counts(scaled.Q))
-            if ended in (Status.STALLED, Status.CYCLING):
+            if ended in (Status.STALLED, Status.CYCLING) and not recorder.late:
                 ended, repeated = None, ended
         if ended is None and recorder.residual > FAR and len(recorder.history) > doubt:
             proof, doubt = infeasibility(recorder.problem, recorder.left()), 10 * doubt
@@ -275,26 +278,11 @@ def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> 
     return Solution(r, multipliers, status, residual, 0, repr(method), message=message)
 
 
-def _dimensionless_start(
-    start: Solution, problem: InterfaceProblem, scales: Scales
-) -> tuple[np.ndarray, np.ndarray]:
-    if not isinstance(start, Solution):
-        raise InputError(f"start must be a Solution; got {type(start).__name__}.")
-    r = real_array("the start's array of reactions", start.reactions)
-    multipliers = real_array("the start's array of multipliers", start.multipliers)
-    if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
-        raise InputError(
-            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs"
-            f" {problem.q.shape} and {problem.s.shape}."
-        )
-    return scales.to_dimensionless(r, multipliers)
-
-
 class _Recorder:
     """Certificate, history and stopping rule of one solve.
 
     clock counts the method's own seconds, certified those of the certificate. Without an iterate
-    the answer is the dimensionless point `first`.
+    the answer is the dimensionless point `first`. An iterate that is `lost` is none.
     """
 
     def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits, first: Iterate):
@@ -302,7 +290,7 @@ class _Recorder:
         self.problem, self.scales, self.limits = problem, scales, limits
         self.reactions, self.multipliers = scales.to_physical(*first)
         self.displacements: Stacked | None = None
-        self.residual = np.inf
+        self.residual, self.lost = np.inf, False
         self.history: list[dict[str, float]] = []
         self.recent: list[State] = [(np.zeros(problem.q.size + len(problem.s)), 0.0)]
         self.best = self._now()
@@ -314,7 +302,8 @@ class _Recorder:
         """Judge the present iterate."""
         begin = time.perf_counter()
         self.residual = self._certificate(known)
-        self.best = min(self.best, self._now(), key=lambda point: point[0])
+        if not self.lost:
+            self.best = min(self.best, self._now(), key=lambda point: point[0])
         self.certified += time.perf_counter() - begin
 
     def _now(self) -> tuple[float, np.ndarray, np.ndarray, Stacked | None]:
@@ -345,6 +334,7 @@ class _Recorder:
     def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate
+        self.lost = bool(max(np.abs(r).max(initial=0.0), np.abs(lam).max(initial=0.0)) > LOST)
         previous, limits = self.reactions, self.limits
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)
         if self.lengthless:
@@ -370,7 +360,12 @@ class _Recorder:
         self.repeated = self.repeated + 1 if any(same) else 0
         if self.repeated >= CONFIRM:
             return Status.STALLED if same[0] else Status.CYCLING
-        if len(self.history) >= limits.max_iterations:
+        return self.late
+
+    @property
+    def late(self) -> Status | None:
+        """Which limit is reached, if one is."""
+        if len(self.history) >= self.limits.max_iterations:
             return Status.ITERATION_LIMIT
         return Status.TIME_LIMIT if self.left() <= 0 else None
 

@@ -46,9 +46,10 @@ def remark(problem: InterfaceProblem, solution: Solution) -> None:
     if loose and problem.contacts <= FEW and isinstance(problem.Q, np.ndarray):
         condition = amplification(problem, at.reactions, at.multipliers)
         if WEDGED < condition < np.inf and condition * at.residual > MUCH:
+            asked = problem.law.proportional and not problem.law.dilatant
             note(
                 logging.getLogger(__name__),
                 "The forces are certified, but they may be off by"
                 f" {min(condition * at.residual, 1.0):.0%} of the typical force, because the"
-                " solution is nearly not unique: see contactopt.diagnose.",
+                f" solution is nearly not unique{': see contactopt.diagnose' if asked else ''}.",
             )

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.linear.operators import InterfaceOperator, asymmetry
+from contactopt.linear.operators import InterfaceOperator, asymmetry, diagonal
 from contactopt.problem.cones import polygon, simplex_steps, unit
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import dimensionless, isotropic
@@ -29,6 +29,7 @@ from contactopt.problem.scaling import dimensionless, isotropic
 MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
 EXACT = 1e-12  # relative size of what rounding leaves of a zero in the conditions on a ray
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
+APART = 1e-9  # of the extent of the contacts, up to which tied nodes that are held meet
 POLISH = 3  # least-squares steps
 
 log = logging.getLogger(__name__)
@@ -53,21 +54,15 @@ class Infeasible:
 
 
 def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infeasible | None:
-    """Look for a proof that a problem has no solution.
+    """Look for a proof that a problem has no solution; None says nothing. The linear program takes
+    `time_limit` [s] at most.
 
     Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not
     looked at. A positive definite Q without a plate needs no search: every such problem has a
     solution.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    time_limit : How long the linear program may take [s]; its steps are limited anyway.
-
-    Returns
-    -------
-    The proof. None says nothing: the problem may have a solution or not.
     """
+    if (apart := held_apart(problem)) is not None:
+        return apart
     problem = isotropic(problem)
     cones = problem.law.unilateral and problem.law.proportional
     if not cones or isinstance(problem.Q, InterfaceOperator) or problem.contacts == 0:
@@ -99,6 +94,31 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infe
         ray = _polished(scaled, Q, *ray)
     log.info("a ray that would prove the problem infeasible did not stand the check")
     return None
+
+
+def held_apart(problem: InterfaceProblem) -> Infeasible | None:
+    """Find a contact without separation or slip that nothing can move, and that is not at rest."""
+    if problem.law.unilateral or not problem.contacts:
+        return None
+    Q, law, places = problem.Q, problem.law, problem.coordinates
+    size = diagonal(Q) if isinstance(Q, InterfaceOperator) else abs(Q).sum(axis=1)
+    moves = (np.asarray(size).ravel() > 0) | np.any(problem.V, axis=1)
+    fixed = np.zeros(problem.q.shape, dtype=bool)
+    fixed[:, 0] = np.broadcast_to(law.lowest, len(fixed)) == -np.inf
+    fixed[:, 1:] = np.isinf(law.bound(np.zeros(len(fixed))))[:, None]
+    fixed &= ~moves.reshape(fixed.shape)
+    apart = np.where(fixed, np.abs(problem.q), 0.0).max(axis=1)
+    worst = int(np.argmax(apart))
+    if not apart[worst] > APART * np.ptp(places, axis=1).max(initial=0.0):
+        return None
+    where = ", ".join(f"{x:.4g}" for x in places[:, worst])
+    sentence = (
+        f"nodes that are tied are held on both sides, {apart[worst]:.3g} apart at ({where}), so"
+        " there is no solution; free one side, or prescribe the same displacement on both."
+    )
+    weights = np.zeros(len(apart))
+    weights[worst] = 1.0
+    return Infeasible(weights, np.zeros(len(problem.s)), float(apart[worst]), sentence)
 
 
 def _definite(problem: InterfaceProblem) -> bool:

@@ -29,7 +29,7 @@ class Status(Enum):
     STALLED = "stalled", "the iterate no longer changes, but the certificate is above the tolerance"
     DIVERGED = "diverged", "the iterates grew without bound; the last finite one is kept"
     INFEASIBLE = "infeasible", "the problem has no solution, which is proved"
-    BACKEND_FAILED = "backend_failed", "a QP or conic backend gave no usable answer"
+    BACKEND_FAILED = "backend_failed", "a QP or conic backend failed"
 
     def __init__(self, label: str, sentence: str):
         self.label = label

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
@@ -87,6 +86,8 @@ def _along_a_line(
     chart: Chart, points: np.ndarray, new: np.ndarray, traction: np.ndarray
 ) -> np.ndarray:
     """Values at `new` (d, m) of the polygon through points (d, k) in the order of their chart."""
+    from scipy.spatial import KDTree  # late, since it takes long to import
+
     order = chart.order()
     order = np.append(order, order[:1]) if chart.closed else order
     corners, values = points[:, order].T, traction[order]

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.errors import InputError
+from contactopt.errors import Unbalanced
 from contactopt.problem.cones import polygon, simplex_steps
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import isotropic
@@ -181,13 +181,13 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
 
 
 def check_equilibrium(problem: InterfaceProblem) -> None:
-    """InputError for a load that no contacts can balance: bodies escape along a named motion, or a
-    plate is pulled off along the normals.
+    """Raise Unbalanced for a load that no contacts can balance: bodies escape along a named motion,
+    or a plate is pulled off along the normals.
     """
     if problem.motions:
         found = escape(problem)
         if found is not None:
-            raise InputError(sentence(problem, found))
+            raise Unbalanced(sentence(problem, found))
         return
     if not len(problem.s) or not problem.law.unilateral:
         return
@@ -197,6 +197,6 @@ def check_equilibrium(problem: InterfaceProblem) -> None:
         along = rounding > 0 and np.all(np.abs(column[:, 1:]) <= rounding)
         # what normal reactions add to s
         if s != 0 and along and np.all(column[:, 0] * np.sign(s) >= -rounding):
-            raise InputError(
+            raise Unbalanced(
                 "the load on the plate pulls the bodies apart: no equilibrium; press them together."
             )

@@ -31,6 +31,7 @@ from scipy.spatial import KDTree
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.chart import ON_PLANE
 from contactopt.problem.contact_status import ContactStatus, contact_status
 from contactopt.readings.constants import (
     FAR,
@@ -50,24 +51,42 @@ from contactopt.readings.patches import End, patches_of
 from contactopt.readings.peaks import Peak, Reading, neighbours
 from contactopt.scenes.scene import Scene
 
+LEVEL = 0.9  # least cosine between normals of a zone in space and their mean that has a half-width
 Read = tuple[float, float]  # a distance and its uncertainty
 Reader = Callable[[End], Read | None]
 
 
-def equivalent_half_width(scene: Scene, area: float) -> float:
-    """Half the width of the strip of the scene's thickness in plane strain, or of the square in
-    space, or the radius of the axisymmetric disc, that has an area [length].
+def contact_area(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
+    """The area on which one pair of surfaces touches, of all mirror images together, around the
+    whole axis, or over the thickness in plane strain [length^2].
+
+    It is that of the zone whose half-width is read, or of the nodes that touch.
     """
-    if scene.kind == "plane-strain":
-        return area / (2 * scene.thickness)
-    return float(np.sqrt(area / np.pi) if scene.kind == "axisymmetric" else np.sqrt(area) / 2)
+    counted = float(problem.areas[contact_status(problem, reactions).touching].sum())
+    width = contact_edge(scene, problem, reactions)
+    nodal = width == scene.analysis.half_width(counted, scene.thickness)
+    if nodal or _is_ring(scene, problem):
+        return counted
+    return (
+        float(np.pi * width**2) if scene.dim == 3 else scene.analysis.area(width, scene.thickness)
+    )
 
 
-def contact_area(scene: Scene, half_width: float) -> float:
-    """The area of a half-width [length^2], the inverse of `equivalent_half_width`."""
-    if scene.kind == "plane-strain":
-        return 2 * half_width * scene.thickness
-    return float(np.pi * half_width**2 if scene.kind == "axisymmetric" else 4 * half_width**2)
+def is_level(problem: InterfaceProblem, frames: np.ndarray, reactions: np.ndarray) -> bool:
+    """Whether a zone of contact on a surface in space has a half-width: where it bends around a
+    body, as in a press fit, its area alone has a meaning. `frames` (k, dim, dim) are the contacts'.
+    """
+    normals = frames[contact_status(problem, reactions).touching, 0]
+    if problem.dim == 2 or not len(normals):
+        return True
+    mean = normals.mean(axis=0)
+    return bool(np.min(normals @ mean) > LEVEL * np.linalg.norm(mean))
+
+
+def _is_ring(scene: Scene, problem: InterfaceProblem) -> bool:
+    """Whether an axisymmetric contact surface does not reach the axis."""
+    radius = np.abs(problem.coordinates[0])
+    return scene.analysis.revolved and bool(np.min(radius) > ON_PLANE * np.max(radius))
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
@@ -141,7 +160,8 @@ def stick_edge(
     status = contact_status(problem, reactions)
     if not status.stick.any():  # or on less than what belongs to one contact
         least = problem.areas[problem.law.rough & status.touching]
-        return 0.0, equivalent_half_width(scene, float(least.max(initial=0.0)))
+        area = float(least.max(initial=0.0))
+        return 0.0, scene.analysis.half_width(area, scene.thickness)
     contact, uncertain = zone or contact_zone(scene, problem, reactions)
     if not status.slip.any():
         return contact, uncertain
@@ -186,15 +206,16 @@ def _half_width(
     least    uncertainty of a reading, in elements
     """
     area = float(problem.areas[inside].sum())
-    counted = equivalent_half_width(scene, area)
+    counted = scene.analysis.half_width(area, scene.thickness)
+    if ring := _is_ring(scene, problem):  # half of the width of the ring, along its section
+        around = 2 * np.pi * np.abs(problem.coordinates[0])
+        counted = float((problem.areas / around)[inside].sum()) / 2
     nodes = inside.sum() * 2.0 ** sum(problem.chart.mirrored)
     # of the nodes at the edge
     share = (1 / nodes if problem.dim == 2 else (np.pi / nodes) ** 0.5) if nodes else 0.0
     coarse = counted, float(counted * min(1.0, share)) if nodes else 0.0
     if inside.all() or not inside.any():
         return coarse
-    if scene.kind == "axisymmetric" and not problem.chart.mirrored[0]:
-        return coarse  # a ring: its chart does not tell the distance from the axis
     found = [patch.measure(read) for patch in patches_of(problem, inside, weights)]
     if not found or any(patch is None for patch in found):
         return coarse
@@ -202,7 +223,7 @@ def _half_width(
     if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
         return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
     uncertainty = sum(patch.copies * max(patch.uncertainty, least * patch.step) for patch in ends)
-    if scene.kind == "axisymmetric":  # a ring between two distances from the axis, or a disc
+    if scene.analysis.revolved and not ring:  # between two distances from the axis, or a disc
         squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
@@ -293,9 +314,7 @@ def width_reading(reduction: Reduction, solution: Solution) -> Reading:
 
 
 def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]:
-    """The contacts on both sides of the edge of a zone, as one peak; none where the zone has no
-    edge.
-    """
+    """The contacts on both sides of a zone's edge, as one peak; none where the zone has no edge."""
     across = inside[neighbours(problem)] != inside[:, None]
     edge = np.flatnonzero(np.any(across, axis=1))
     return (Peak(0.0, 0.0, problem.coordinates[:, edge[0]], 0.0, edge),) if len(edge) else ()

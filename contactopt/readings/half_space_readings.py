@@ -28,7 +28,7 @@ class SurfaceContact:
     largest_pressure    [stress];  mean_gap  of the open contacts [length]
     slip_work           work of friction if the slip happened in this state's step, sum -r_t'u_t
                         [force length]: the dissipated energy of a state reached in one step from
-                        contact without slip. Of a load path it is
+                        contact without slip. For a load path it is
                         PathResult.history["friction_work"]
     """
 
@@ -44,9 +44,7 @@ class SurfaceContact:
 
 
 def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceContact:
-    """The numbers that describe one solved state: areas, pressures, the mean gap and the work of
-    friction.
-    """
+    """The numbers that describe a solved state: areas, pressures, mean gap and friction's work."""
     r, areas = solution.reactions, problem.areas
     status, u = contact_status(problem, r), problem.displacements(r, solution.multipliers)
     area, whole = float(areas[status.touching].sum()), float(areas.sum())

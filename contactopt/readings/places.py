@@ -88,8 +88,6 @@ def place_of(name: Any, scene: Scene) -> Place | None:
 
     InputError for a body, pair, component or point that the scene does not have.
     """
-    from contactopt.bodies.fields import STRESSES
-
     if not isinstance(name, str):
         return None
     head, at, where = name.partition("@")
@@ -107,12 +105,10 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     body, _, boundary = rest.partition(":")
     meshed = {part.name: part for part in scene.parts if hasattr(part, "build_mesh")}
     if body not in meshed:
-        raise InputError(
-            f"quantity {name!r}: there is no elastic body {body!r} with a mesh; choose from"
-            f" {', '.join(meshed)}."
-        )
-    if kind != LARGEST and stress not in STRESSES[scene.kind]:
-        names = ", ".join(f"stress_{own}" for own in STRESSES[scene.kind])
+        wrong = f"there is no elastic body {body!r} with a mesh" if body else "it needs a body"
+        raise InputError(f"quantity {name!r}: {wrong}; choose from {', '.join(meshed)}.")
+    if kind != LARGEST and stress not in scene.analysis.stresses:
+        names = ", ".join(f"stress_{own}" for own in scene.analysis.stresses)
         raise InputError(
             f"quantity {name!r}: there is no stress {kind!r}; choose from {names} and von_mises."
         )
@@ -130,9 +126,7 @@ def place_of(name: Any, scene: Scene) -> Place | None:
 
 
 def _check_there(part: Any, region: Region, scene: Scene) -> None:
-    """InputError for a boundary that the first mesh of a body does not have, and for a point far
-    outside it.
-    """
+    """InputError for a boundary that the body's first mesh lacks, and for a point far outside."""
     from contactopt.meshes.cells import straight
 
     mesh = part.build_mesh(scene.elements, scene.zone)
@@ -183,7 +177,7 @@ def read_stress(
 
     InputError for a boundary that the body does not have, and a point outside the body.
     """
-    from contactopt.bodies.fields import STRESSES, von_mises, von_mises_slopes
+    from contactopt.bodies.fields import von_mises, von_mises_slopes
 
     number, recovered = _map_of(place, reduction)
     U = displaced[number]
@@ -195,7 +189,7 @@ def read_stress(
         near = cKDTree(points).query(points, k=count)[1].reshape(-1, count)
         tops = maxima(sizes, sizes[near].max(axis=1)).tolist()
     else:
-        column = STRESSES[reduction.scene.kind].index(place.kind)
+        column = reduction.scene.analysis.stresses.index(place.kind)
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))
@@ -256,9 +250,7 @@ def place_seeds(place: Place, state: State) -> Seeds:
 
 
 def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
-    """(k, dim) what the force at each contact contributes to the pressure at a place
-    [1 / length^2].
-    """
+    """(k, dim) what the force at each contact contributes to a place's pressure [1 / length^2]."""
     problem = reduction.problem
     pairs = {pair.name: pair for pair in problem.pairs}
     own = np.zeros(problem.contacts, dtype=bool)

@@ -30,10 +30,11 @@ import numpy as np
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import Solution
 from contactopt.readings.edges import stick_reading, width_reading
 from contactopt.readings.peaks import Peak, Reading, pressure_reading
 from contactopt.readings.places import PLACED, place_of, place_seeds, read_place
+from contactopt.readings.plate_motions import approach, motion
 from contactopt.readings.resultants import views
 from contactopt.readings.slopes import of_pressure, of_stick, of_width
 from contactopt.readings.state import Functional, Seeds, State
@@ -41,7 +42,6 @@ from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Scene
 
 __all__ = ["ROWS", "Functional", "Peak", "Quantity", "Reading", "find_quantity", "value_of"]
-CLOSED = 1e-3  # a mean motion below this share of the mean size is that of a surface around a body
 Reader = Callable[[Reduction, Solution], Reading]
 
 
@@ -118,20 +118,6 @@ def value_of(name: str, reduction: Reduction, solution: Solution) -> float:
     return find_quantity(name, reduction.scene).read(reduction, solution).value
 
 
-def approach(problem: InterfaceProblem, solution: Solution) -> float | None:
-    """How far the plates bring the bodies together along the mean normal [length].
-
-    None without a plate, and where the surface surrounds a body, so that its normals have no mean.
-    """
-    if len(solution.multipliers) == 0:
-        return None
-    normal = (problem.V @ solution.multipliers).reshape(problem.q.shape)[:, 0]
-    mean, size = (
-        float(np.average(motion, weights=problem.areas)) for motion in (normal, np.abs(normal))
-    )
-    return None if size > 0 and abs(mean) < CLOSED * size else -mean
-
-
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
     """Elastic energy of all bodies together, the sum of U' A U / 2 [force length]."""
     displaced = reduction.displaced(solution)
@@ -198,6 +184,12 @@ def _pair_force(name: str, rest: str, scene: Scene) -> Quantity:
 
 def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
     pair, _, component = rest.rpartition(":")
+    if not pair:
+        raise InputError(
+            f"a resultant needs a contact and a component, as in"
+            f" resultant:{scene.pairs[0].name}:{scene.components[-1]}; the contacts are"
+            f" {', '.join(own.name for own in scene.pairs)}."
+        )
     _check_pair(pair, scene)
     if component not in scene.components:
         raise InputError(f"there is no component {component!r}; use {', '.join(scene.components)}.")
@@ -206,7 +198,7 @@ def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
         axis = np.eye(scene.dim)[scene.components.index(component)]
         for plane in state.reduction.planes:  # mirror images balance each other across it
             axis = axis - plane.inward * (plane.inward @ axis)
-        if scene.kind == "axisymmetric" and component == "r":
+        if scene.analysis.revolved and component == "r":
             axis = 0 * axis
         weights, own = np.zeros(state.problem.q.shape), _contacts(state, pair)
         weights[own] = state.reduction.frames[own] @ axis
@@ -226,17 +218,31 @@ def _contacts(state: State, name: str) -> slice:
 
 
 def _motion(state: State, component: int) -> Seeds:
-    problem, lam = state.problem, state.solution.multipliers
-    near = approach(problem, state.solution)
-    if len(lam) == 0 or (component == 0 and near is None):
+    reduction, sign = state.reduction, -1.0 if component == 0 else 1.0
+    found = None
+    if approach(reduction, state.solution) is not None or component == 1:
+        found = motion(reduction, state.displaced, component)
+    if found is None or not len(state.solution.multipliers):
         raise InputError(
-            f"scene '{state.reduction.scene.name}' has no plate, hence no approach and no shift, or"
+            f"scene '{reduction.scene.name}' has no plate, hence no approach and no shift, or"
             " surfaces around a body, which have no mean normal; ask for another quantity."
         )
-    rows = problem.V.reshape(problem.contacts, problem.dim, -1)[:, component]
-    weights = np.average(rows, axis=0, weights=problem.areas) * (-1.0 if component == 0 else 1.0)
-    value = float(weights @ lam) if component or near is None else near
-    return Seeds(value, multipliers=weights)
+    by_r, by_motions, by_U = np.zeros(state.problem.q.shape), [], []
+    for body, B, weights in zip(reduction.bodies, reduction.maps, sign * found.weights):
+        own: Any = np.zeros(len(body.resultants))
+        total: Any = None
+        for c in np.flatnonzero(weights):
+            w, moved = (weights[c] * each for each in body.carried(int(c)))
+            rates = w @ body.motions
+            own = own + rates
+            if np.any(moved) or not np.any(rates):  # more than the free motions move it
+                by_r += (B @ moved).reshape(by_r.shape)
+                total = w if total is None else total + w
+        by_motions.append(own)
+        by_U.append(total)
+    bodies = tuple(by_U) if any(each is not None for each in by_U) else ()
+    value = sign * found.value + 0.0
+    return Seeds(value, by_r if bodies else None, np.concatenate(by_motions), bodies=bodies)
 
 
 def _pressure_at(state: State, number: int) -> Seeds:

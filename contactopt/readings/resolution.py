@@ -9,34 +9,35 @@ import numpy as np
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
+from contactopt.readings.peaks import Reading
 from contactopt.readings.resultants import views
 
 # elements across the half-width of contact; with so few the largest pressure is some percent off
 # (reports/accuracy)
 FEWEST = 4
+APART = 0.05  # relative difference of two readings of the largest pressure that is told
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Full sentences on zones of contact that end by themselves and are smaller than the mesh can
-    show, a disc or strip of FEWEST elements across its half-width, and on contacts at the other
-    surface's rim, where only a part of their faces bears the force; none for solutions that are not
-    certified.
+    """Full sentences on couplings that do not pass a constant pressure on. For certified solutions
+    also on zones of contact that end by themselves and are smaller than the mesh can show, a disc
+    or strip of FEWEST elements across its half-width, and on contacts at the other surface's rim,
+    where only a part of their faces bears the force.
     """
+    coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:
-        return ()
+        return coupled
     few = [
         f"too few contacts of '{name}' touch, {len(own)} of {count}, to show how the pressure is"
         " distributed: refine the meshes there, or ask for an accuracy."
         for (name, count), own in coarse(reduction, solution)
     ]
-    return (*few, *_at_rims(reduction, solution))
+    return (*coupled, *few, *_at_rims(reduction, solution))
 
 
 def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on contacts that touch where the other surface ends and covers a part of their
-    faces.
-    """
+    """Sentences on contacts where the other surface ends and covers a part of their faces."""
     found = []
     for (view, own), coupling in zip(views(reduction, solution), reduction.couplings):
         touches = contact_status(view.problem, own.reactions).touching
@@ -66,3 +67,14 @@ def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, in
         if 0 < len(touching) < problem.contacts and len(touching) * images < strip:
             found.append(((pair.name, problem.contacts), touching + pair.start))
     return found
+
+
+def smoothed(peak: Reading, largest: float) -> list[str]:
+    """One sentence where the largest pressure at a node is not the one that is read around it."""
+    if abs(largest - peak.value) <= APART * abs(largest):
+        return []
+    return [
+        f"the largest pressure at a node is {largest:.4g}, and its"
+        f" neighbours suggest {peak.value:.4g}, give or take"
+        f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
+    ]

@@ -12,10 +12,12 @@ import numpy as np
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
+from contactopt.problem.cones import lengths
 from contactopt.problem.contact_status import contact_status
-from contactopt.readings.edges import contact_zone, stick_width
+from contactopt.readings.edges import contact_area, contact_zone, is_level, stick_width
 from contactopt.readings.peaks import nodal_pressure
-from contactopt.scenes.scene import COMPONENTS, BodyForce, Traction
+from contactopt.scenes.kinds import KINDS
+from contactopt.scenes.scene import BodyForce, Traction
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
@@ -23,9 +25,7 @@ ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and
 
 @dataclass(frozen=True, eq=False)
 class Resultant:
-    """A force (dim,) and its moment about the origin, in 2D (1,) about the third axis, in space
-    (3,).
-    """
+    """A force (dim,) and its moment about the origin, (1,) about the third axis in 2D or (3,)."""
 
     force: np.ndarray
     moment: np.ndarray
@@ -33,7 +33,7 @@ class Resultant:
     @property
     def table(self) -> dict[str, list[float]]:
         """As lists, for files."""
-        return {"force": self.force.tolist(), "moment": self.moment.tolist()}
+        return {"force": (self.force + 0.0).tolist(), "moment": (self.moment + 0.0).tolist()}
 
 
 def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> Resultant:
@@ -41,7 +41,7 @@ def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> 
     together or of whole rings, with components r and z. Mirror images across `planes` and the parts
     of a ring balance each other but for what acts along the planes and along the axis.
     """
-    if reduction.scene.kind == "axisymmetric":
+    if reduction.scene.analysis.revolved:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
     for plane in reduction.planes:
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
@@ -58,7 +58,7 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
     empty where the bodies are whole, and where a plane does not lie across an axis.
     """
     scene = reduction.scene
-    if scene.kind == "axisymmetric":
+    if scene.analysis.revolved:
         return [{"axis": scene.components[0], "place": 0.0}]
     made = []
     for plane in reduction.planes:
@@ -77,13 +77,18 @@ def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
     """For every pair of surfaces, by its name, the resultant of the contact forces on its upper
-    body.
+    body: of the forces on the nodes, which balance those of the supports to rounding. Those on the
+    nodes of the lower body count where the upper one has none.
     """
-    forces, points = space_forces(reduction, solution), reduction.problem.coordinates
-    return {
-        pair.name: _resultant(reduction, points[:, pair.contacts], forces[:, pair.contacts])
-        for pair in reduction.problem.pairs
-    }
+    named = {body.name: body for body in reduction.bodies}
+    space, found = space_forces(reduction, solution), {}
+    for pair, own, made in zip(reduction.scene.pairs, reduction.problem.pairs, reduction.couplings):
+        forces, acting = solution.reactions[own.contacts].ravel(), None
+        for name, trace in zip(pair.bodies, (made.upper, made.lower)):
+            acting = named[name].acting(trace.T @ forces) if acting is None else acting
+        points = reduction.problem.coordinates[:, own.contacts]
+        found[own.name] = _resultant(reduction, *(acting or (points, space[:, own.contacts])))
+    return found
 
 
 def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
@@ -115,12 +120,13 @@ def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
     """For the name of each pair the components of the force on its upper body, without their unit,
     from the summary of a result: normal forces of a curved surface add up to more than it.
     """
-    axes = COMPONENTS[summary["kind"]]
+    axes = KINDS[summary["kind"]].components
     words = {}
     for name, pair in summary["pairs"].items():
-        least = ROUNDING * max(map(abs, (*pair["force"], pair["normal_force"])))
+        known = [f or 0.0 for f in (*pair["force"], pair["normal_force"])]  # None: not finite
+        least = ROUNDING * max(map(abs, known))
         words[name] = ", ".join(
-            f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, pair["force"])
+            f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, known)
         )
     return words
 
@@ -135,7 +141,7 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     force:PAIR:x, moment:PAIR:z                      on the upper body of a pair
     force:body 'block', support 'bottom':x           of a support or plate on its body
     """
-    scene, axes = reduction.scene, COMPONENTS[reduction.scene.kind]
+    scene, axes = reduction.scene, reduction.scene.components
     found: dict[str, float] = {}
     for part in scene.parts:
         for item in (part, *getattr(part, "supports", ()), *getattr(part, "loads", ())):
@@ -145,6 +151,9 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
                     found[":".join([*filter(None, place), axis])] = float(value)
     names = reduction.problem.motions or range(len(solution.multipliers))
     found |= {f"motion:{name}": float(x) for name, x in zip(names, solution.multipliers)}
+    for body, U in zip(reduction.bodies, reduction.displaced(solution)):
+        plates = body.plates(U).items()
+        found |= {f"motion:body '{body.name}': {name}": value for name, value in plates}
     every = pair_resultants(reduction, solution) | holder_resultants(reduction, solution)
     turns = axes if reduction.problem.dim == 3 else ("z",)
     for name, own in every.items():
@@ -164,8 +173,9 @@ def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     """The tables of a summary. 'pairs': for each pair of surfaces its resultant, normal force
-    [force], largest pressure [stress], half-widths [length], coupling and counts of contacts.
-    'holders': the resultant of each support and plate.
+    [force], the sums of the sizes of its friction forces and of their bounds
+    [force], largest pressure [stress], area [length^2], half-widths [length], coupling with its
+    reason, and counts of contacts. 'holders': the resultant of each support and plate.
     """
     pairs = {}
     for (view, own), (name, found) in zip(
@@ -173,12 +183,17 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     ):
         problem, r = view.problem, own.reactions
         status, zone = contact_status(problem, r), contact_zone(view.scene, problem, r)
+        level = is_level(problem, view.coupling.frames, r)
         pairs[name] = found.table | {
             "normal_force": float(r[:, 0].sum()),
+            "friction_force": float(lengths(r[:, 1:]).sum()),
+            "friction_bound": float(problem.law.bound_along(r).sum()),
             "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
-            "contact_half_width": zone[0],
-            "stick_half_width": stick_width(view, own, zone)[0],
+            "contact_area": contact_area(view.scene, problem, r),
+            "contact_half_width": zone[0] if level else None,
+            "stick_half_width": stick_width(view, own, zone)[0] if level else None,
             "coupling": view.coupling.kind,
+            "coupled_because": view.coupling.why,
             "carrier": view.coupling.carrier,
             "contacts": problem.contacts,
             "open": int(status.open.sum()),

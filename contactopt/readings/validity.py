@@ -7,13 +7,17 @@ factors that made the interface problem.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
+from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
+from contactopt.readings.plausibility import SHARE
 
 # The largest values that draw no remark.
 BOUNDS = {
@@ -26,9 +30,42 @@ BOUNDS = {
     # of the surfaces of the displaced bodies where they touch, relative to their displacement
     "misfit": 1e-3,
 }
-# of the extent of a surface, up to which a closed gap is small, however fine its facets are
-SHARE = 0.02
+# strains that no body has: of surfaces that overlap, which squeeze an element to nothing, and of
+# loads, which may be as small or large as their unit
+SQUEEZED, IMPOSSIBLE = 0.9, 3.0
 UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facets"}
+
+
+def overlap_share(reduction: Reduction, solution: Solution) -> float:
+    """By which share the areas of two surfaces differ that overlap as they are drawn, the mean over
+    the contacts with their forces as weights [-].
+
+    Small displacements do not tell on which of the two a pressure acts.
+    """
+    shares = np.zeros(len(solution.reactions))
+    ring = reduction.scene.kind == "axisymmetric"
+    for pair, made in zip(reduction.problem.pairs, reduction.couplings):
+        if made.cells.shape[0] < reduction.scene.dim:
+            continue
+        cells, away = made.cells[: reduction.scene.dim], np.minimum(made.gap, 0.0)
+        here = _measures(made.positions, cells, ring)
+        own = np.zeros(len(away))
+        for side in (1, -1):
+            there = _measures(made.positions + side * away * made.frames[:, 0].T, cells, ring)
+            change = np.divide(there, here, out=np.ones_like(here), where=here > 0) - 1
+            for corner in cells:
+                np.maximum.at(own, corner, np.abs(change))
+        shares[pair.contacts] = own
+    forces = np.abs(solution.reactions[:, 0])
+    return float(shares @ forces / max(forces.sum(), 1e-300))
+
+
+def _measures(places: np.ndarray, cells: np.ndarray, ring: bool) -> np.ndarray:
+    """Lengths or areas (c,) of cells between places (dim, k), of rings those around the axis."""
+    corners = places[:, cells]
+    edges = corners[:, 1:] - corners[:, :1]
+    size = np.sqrt(np.linalg.det(np.einsum("dac,dbc->cab", edges, edges)))
+    return np.asarray(size * np.abs(corners[0]).mean(axis=0) if ring else size)
 
 
 def _sizes(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -78,13 +115,31 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
         pairs[pair.name] = largest | {"misfit": misfit}
         for key in ("slip", "closure"):
             remarks += _beyond(key, f"pair '{pair.name}'", largest[key])
-        if solution.solved and misfit > BOUNDS["misfit"]:
+        if misfit > BOUNDS["misfit"]:
             remarks.append(
                 f"where the surfaces of '{pair.name}' touch, the displaced bodies miss each other"
                 f" by {misfit:.1e} of their displacement: a body is so thin or so weakly held that"
                 " rounding moves it."
             )
-    return {"bodies": bodies, "pairs": pairs}, remarks
+    # the last iterate of what was not solved says nothing of the bodies
+    return {"bodies": bodies, "pairs": pairs}, remarks if solution.solved else []
+
+
+def check_possible(limits: dict[str, Any], couplings: Sequence[Coupling]) -> None:
+    """Raise InputError where a body is squeezed to nothing, and not at the tip of a corner alone,
+    by the tables of validity().
+    """
+    overlaps = any(
+        -own.gap.min() > SHARE * np.ptp(own.positions, axis=1).max() for own in couplings
+    )
+    most = SQUEEZED if overlaps else IMPOSSIBLE
+    for name, known in limits["bodies"].items():
+        if known["mean_strain"] > BOUNDS["strain"] and known["strain"] > most:
+            raise InputError(
+                f"no body can deform like this: the answer has a strain of {known['strain']:.3g} in"
+                f" body '{name}'; see whether E and the loads are in the same unit, whether the"
+                " surfaces that may touch are the right ones, and how far they overlap."
+            )
 
 
 def _beyond(key: str, where: str, value: float) -> list[str]:

@@ -16,10 +16,9 @@ from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.meshes.given_curves import Curve
+from contactopt.scenes.kinds import KINDS
 
 LARGEST_VALUE = 1e100  # of forces, stresses and lengths: the squares of larger ones are no numbers
-# The components of a displacement, in the order of the mesh coordinates.
-COMPONENTS = {"plane-strain": ("x", "y"), "axisymmetric": ("r", "z"), "solid": ("x", "y", "z")}
 Function = Callable[[np.ndarray], np.ndarray]
 
 
@@ -126,7 +125,7 @@ class Part:
             if isinstance(load, Plate):
                 check_components(self.name, load.force, kind)
                 continue
-            what, components, value = type(load).__name__, COMPONENTS[kind], load.value
+            what, components, value = type(load).__name__, KINDS[kind].components, load.value
             listed = isinstance(value, (tuple, list, np.ndarray)) and np.iterable(value)
             if not listed or len(value) != len(components):
                 needs = f"a {what} needs a tuple of {len(components)} values"
@@ -141,35 +140,20 @@ class Part:
         return not callable(self.mesh)
 
     def curve_of(self, boundary: str) -> Curve | None:
-        """Find the function that puts points of a contact boundary on its surface.
-
-        Parameters
-        ----------
-        boundary : its name
-
-        Returns
-        -------
-        Curve : a function of points (dim, m) to points (dim, m) [length], if there is one
-        """
+        """The function, if any, that puts points (dim, m) [length] of a boundary on its surface."""
         if callable(self.curve):
             found = self.curve if boundary == self.contact else None
         else:
             found = (self.curve or {}).get(boundary)
         if found is None or isinstance(found, Curve):
             return found
-        return Curve(found, True, f"the curve of boundary {boundary!r} of body '{self.name}'")
+        label = f"the curve of boundary {boundary!r} of body '{self.name}'"
+        return Curve(found, True, label, given=True)
 
     def build_mesh(self, elements: int, zone: float | None) -> Any:
-        """Make the mesh of the body.
-
-        Parameters
-        ----------
-        elements : number across the contact half-width
-        zone : half-width of contact that the mesh resolves [length]; None: the scene's first guess
-
-        Returns
-        -------
-        Mesh : of scikit-fem; the given one, if the part has a mesh and no function
+        """The mesh of the body, with `elements` across the half-width `zone` [length] of the
+        contact; None: the scene's first guess. It is the given one if the part has a mesh and no
+        function.
         """
         return self.mesh(elements, zone) if callable(self.mesh) else self.mesh
 
@@ -208,7 +192,7 @@ class Rigid:
         _check_motion(self, kind)
         if self.normal is None:
             return
-        dim = len(COMPONENTS[kind])
+        dim = len(KINDS[kind].components)
         if len(self.normal) != dim or not np.any(self.normal):
             raise InputError(
                 f"rigid body '{self.name}': its normal needs {dim} values, not all zero."
@@ -275,21 +259,11 @@ class HalfSpace:
         return not callable(self.points)
 
     def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:
-        """Compute the places of the points along each of the axes.
+        """The places (n_i,) [length] of the points along each of the axes. InputError unless they
+        are evenly spaced and growing, at least four along each axis.
 
-        Parameters
-        ----------
-        elements : number across the contact half-width, for points that are given by a function
-        zone : half-width that they resolve [length]
-        axes : number of axes
-
-        Returns
-        -------
-        tuple of ndarray : places (n_i,) along each axis [length]
-
-        Raises
-        ------
-        InputError : unless they are evenly spaced and growing, at least four along each axis
+        Points that are given by a function depend on `elements` across the contact half-width, and
+        on the half-width `zone` [length] that they resolve.
         """
         given = self.points(elements, zone) if callable(self.points) else self.points
         if not isinstance(given, (tuple, list, np.ndarray)) or len(given) == 0:
@@ -329,7 +303,7 @@ def _check_motion(body: Rigid | HalfSpace, kind: str) -> None:
 
 def check_components(body: str, values: Mapping[str, float], kind: str) -> None:
     """Raise InputError unless values are given by names of the components of a kind of scene."""
-    components = COMPONENTS[kind]
+    components = KINDS[kind].components
     if not isinstance(values, Mapping):
         raise InputError(
             f"body '{body}': a value is given for each component by its name, as in "
@@ -337,7 +311,7 @@ def check_components(body: str, values: Mapping[str, float], kind: str) -> None:
         )
     for component, value in values.items():
         if component not in components:
-            others = [other for other, names in COMPONENTS.items() if component in names]
+            others = [other for other, own in KINDS.items() if component in own.components]
             remedy = f", or give the scene kind={others[-1]!r}" if others else ""
             raise InputError(
                 f"body '{body}': there is no component {component!r}; use {', '.join(components)},"

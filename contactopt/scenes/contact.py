@@ -10,7 +10,7 @@ import numpy as np
 
 from contactopt.checks import check_number, real_array
 from contactopt.errors import InputError
-from contactopt.problem.laws import Law, find_law
+from contactopt.problem.laws import LAWS, Law, find_law
 
 SIDES = ("upper", "lower")
 
@@ -82,7 +82,9 @@ class Contact:
     @property
     def friction(self) -> str:
         """The law and its number, for titles: 'mu = 0.3'."""
-        name = "mu" if self.law in ("coulomb", "bilateral") else f"{self.law}, mu"
+        law = find_law(self.law)
+        plain = law.proportional and law.frictional and not law.dilatant
+        name = "mu" if plain else f"{self.law}, mu"
         if callable(self.mu):
             return f"{name} varies"
         values = np.ravel(self.mu)
@@ -92,9 +94,10 @@ class Contact:
 
 def _check_direction(name: str, direction: Any, law: type[Law]) -> None:
     if not law.directed:
+        directed = " or ".join(repr(own) for own in LAWS if find_law(own).directed)
         raise InputError(
             f"the law of contact '{name}' is the same in all directions; leave out the direction,"
-            " or take the law 'orthotropic'."
+            f" or take the law {directed}."
         )
     if not real_array(f"the direction of friction of contact '{name}'", direction).any():
         raise InputError(f"the direction of friction of contact '{name}' is zero.")

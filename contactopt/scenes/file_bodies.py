@@ -14,9 +14,9 @@ from contactopt.scenes.body_shapes import make_mesh
 from contactopt.scenes.expressions import Expression
 from contactopt.scenes.facing_boundaries import Facing
 from contactopt.scenes.file_surfaces import half_space_shape
+from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, material_of
 from contactopt.scenes.scene import (
-    COMPONENTS,
     BodyForce,
     HalfSpace,
     Part,
@@ -72,7 +72,7 @@ class Reading:
 
     @property
     def components(self) -> tuple[str, ...]:
-        return COMPONENTS[self.kind]
+        return KINDS[self.kind].components
 
 
 def read_body(bodies: Table, name: str, reading: Reading) -> Part | Rigid | HalfSpace:

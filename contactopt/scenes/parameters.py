@@ -29,6 +29,7 @@ import numpy as np
 
 from contactopt.checks import check_number
 from contactopt.errors import InputError
+from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import BodyForce, Plate, Scene, Support, Traction
 
 MATERIAL = ("E", "nu")
@@ -108,7 +109,7 @@ class Parameter:
 
     def pairs(self, scene: Scene) -> list[Any]:
         """The pairs of surfaces whose friction it is."""
-        rough = [pair for pair in scene.pairs if pair.law not in ("frictionless", "tied")]
+        rough = [pair for pair in scene.pairs if find_law(pair.law).frictional]
         return [pair for pair in rough if self.owner in ("", pair.name)]
 
     def _friction(self, pair: Any) -> float:

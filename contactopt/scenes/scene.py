@@ -15,7 +15,6 @@ import numpy as np
 from contactopt.checks import check_number, short
 from contactopt.errors import InputError
 from contactopt.scenes.body_kinds import (
-    COMPONENTS,
     Body,
     BodyForce,
     HalfSpace,
@@ -26,9 +25,9 @@ from contactopt.scenes.body_kinds import (
     Traction,
 )
 from contactopt.scenes.contact import Contact
+from contactopt.scenes.kinds import KINDS, Kind
 
 __all__ = [
-    "COMPONENTS",
     "BodyForce",
     "HalfSpace",
     "Part",
@@ -53,8 +52,8 @@ class Scene:
     mu, law    of the short form, as in Contact
     bodies     of the long form
     contacts   of the long form; every body belongs to at least one of them
-    kind       'plane-strain', 'axisymmetric' (coordinates r, z) or 'solid'.
-    thickness  depth of a plane-strain body [length].
+    kind       'plane-strain', 'plane-stress', 'axisymmetric' (coordinates r, z) or 'solid'.
+    thickness  depth of a body in the plane [length].
     copies     how many mirror images make the whole body: 2 for a half model, 4 for a quarter.
                Forces, nodal forces and nodal areas are those of all the images together, as on the
                ring of an axisymmetric body.
@@ -63,7 +62,8 @@ class Scene:
                are those on which supports hold the normal alone
     state      name of the step of a load path to which this state belongs
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly
-               incompressible bodies, where linear elements lock.
+               incompressible bodies, where linear elements lock. By default that of the meshes: 2
+               if one that is given has elements of second order, else 1.
     elements   default number of elements across the contact half-width, for parts whose mesh is a
                function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the
@@ -79,7 +79,7 @@ class Scene:
     kind: str = "plane-strain"
     thickness: float = 1.0
     copies: int = 1
-    degree: int = 1
+    degree: int = None  # type: ignore[assignment]  # that of the meshes, set when it is made
     law: str = "coulomb"
     elements: int = 16
     zone: float | None = None
@@ -93,8 +93,8 @@ class Scene:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise InputError(f"the scene's name must be a text; got {short(self.name)}.")
-        if not isinstance(self.kind, str) or self.kind not in COMPONENTS:
-            raise self._wrong(f"unknown kind {self.kind!r}; choose from {', '.join(COMPONENTS)}.")
+        if not isinstance(self.kind, str) or self.kind not in KINDS:
+            raise self._wrong(f"unknown kind {self.kind!r}; choose from {', '.join(KINDS)}.")
         self._check_form()
         for part in self.parts:
             if not isinstance(part, Body):
@@ -109,6 +109,8 @@ class Scene:
                 raise self._wrong(f"{name} must be a whole number of at least 1; got {count!r}.")
         if self.elements > MOST_ACROSS:
             raise self._wrong(f"elements must be at most {MOST_ACROSS}; got {self.elements}.")
+        if self.degree is None:
+            object.__setattr__(self, "degree", 2 if any(map(_curved, self.parts)) else 1)
         if type(self.degree) is not int or self.degree not in (1, 2):
             raise self._wrong(
                 f"the degree of the displacement must be 1 or 2; got {self.degree!r}."
@@ -151,44 +153,17 @@ class Scene:
         return (Contact(self.upper.name, self.lower.name, self.mu, self.law),)
 
     def with_parts(self, change: Callable[[Any], Any]) -> Scene:
-        """Change the bodies of a scene.
-
-        Parameters
-        ----------
-        change : a function of a body that returns another one
-
-        Returns
-        -------
-        Scene : with the bodies that it returned
-        """
+        """The scene with the bodies that a function makes of its bodies."""
         if self.upper is None or self.lower is None:
             return replace(self, bodies=tuple(change(part) for part in self.bodies))
         return replace(self, upper=change(self.upper), lower=change(self.lower))
 
     def surfaces_of(self, part: Any) -> tuple[str, ...]:
-        """Name the boundaries of a part that contacts use.
-
-        Parameters
-        ----------
-        part : one of the bodies
-
-        Returns
-        -------
-        tuple of str : the names, each once, in the order of the pairs
-        """
+        """The boundaries of a part that contacts use, each once, in the order of the pairs."""
         return tuple(dict.fromkeys(name for name, _ in self._uses(part))) or (part.contact,)
 
     def laws_of(self, part: Any, boundary: str) -> set[str]:
-        """Name the contact laws of the pairs that use a boundary.
-
-        Parameters
-        ----------
-        part, boundary : one of the bodies, and the name of one of its boundaries
-
-        Returns
-        -------
-        set of str : their names; none for a boundary that no pair uses
-        """
+        """The contact laws of the pairs that use a boundary; none where no pair uses it."""
         return {pair.law for name, pair in self._uses(part) if name == boundary}
 
     def _uses(self, part: Any) -> list[tuple[str, Contact]]:
@@ -201,8 +176,13 @@ class Scene:
         ]
 
     @property
+    def analysis(self) -> Kind:
+        """What follows from the kind of the scene."""
+        return KINDS[self.kind]
+
+    @property
     def components(self) -> tuple[str, ...]:
-        return COMPONENTS[self.kind]
+        return self.analysis.components
 
     @property
     def dim(self) -> int:
@@ -247,6 +227,19 @@ class Scene:
                 f" {self.copies}; drop one of them."
             )
 
+    def _check_once(self) -> None:
+        """No two surfaces are joined twice: both pairs would carry a part of one force."""
+        contact = {part.name: getattr(part, "contact", None) for part in self.parts}
+        known: dict[frozenset[tuple[str, str | None]], Contact] = {}
+        for pair in self.pairs:
+            sides = zip(pair.bodies, pair.surfaces)
+            same = known.setdefault(frozenset((b, s or contact[b]) for b, s in sides), pair)
+            if same is not pair:
+                raise self._wrong(
+                    f"contacts '{same.name}' and '{pair.name}' join the same two surfaces, and"
+                    " each would carry a part of their force; keep one of them."
+                )
+
     def _check_pairs(self) -> None:
         """Names are known and given once, each body is in a pair, no pair is of rigid bodies."""
         names = [part.name for part in self.parts]
@@ -275,6 +268,17 @@ class Scene:
                 raise self._wrong(
                     f"both bodies of contact '{pair.name}' are rigid; at least one must be elastic."
                 )
+        self._check_once()
         for name in names:
             if not any(name in pair.bodies for pair in pairs):
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")
+
+
+def _curved(part: Any) -> bool:
+    """Whether a body has a given mesh of second order."""
+    mesh = getattr(part, "mesh", None)
+    if not hasattr(mesh, "nvertices"):
+        return False
+    from contactopt.meshes.cells import is_curved
+
+    return is_curved(mesh)

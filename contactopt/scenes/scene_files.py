@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, change, read_table
 from contactopt.problem.laws import LAWS
@@ -20,8 +22,9 @@ from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 from contactopt.scenes.file_bodies import Reading, components_of, function_of, read_body
+from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, library, read_materials
-from contactopt.scenes.scene import COMPONENTS, Scene
+from contactopt.scenes.scene import Scene
 
 MOST_STATES = 10_000  # of a step of a load path
 AUTO = "auto"  # in place of the contacts: they are found
@@ -104,7 +107,7 @@ def read_scenes(
 def _scene(
     path: Path, top: Table, reading: Reading | None
 ) -> tuple[Scene, dict[str, Any], Reading]:
-    kind = top.take("kind", str, "plane-strain", among=COMPONENTS)
+    kind = top.take("kind", str, "plane-strain", among=KINDS)
     units = top.table("units")
     length, stress = "length", "stress"
     if units:
@@ -126,8 +129,6 @@ def _scene(
             "there are no contacts; add a table [[contacts]]"
             " for each pair of surfaces that may touch."
         )
-    meshes = [mesh for mesh in reading.meshes.values() if hasattr(mesh, "nvertices")]
-    curved = any(mesh.p.shape[1] != mesh.nvertices for mesh in meshes)
     changes = {
         "contacts": tuple(_contact(pair, parts, reading) for pair in pairs),
         "thickness": top.take("thickness", float, 1.0, low=0.0),
@@ -135,13 +136,11 @@ def _scene(
         "mirror": top.take("mirror", str, "") or None,
         "state": reading.step if steps else "",
     }
-    for key, usual, most, valid in (
-        ("copies", 1, 1000, "at least 1"),
-        ("degree", 2 if curved else 1, 2, "1 or 2"),
-    ):
-        changes[key] = top.take(key, int, usual)
-        if not 1 <= changes[key] <= most:
-            raise top.fail(f"{key} must be {valid}; got {changes[key]}.", key)
+    for key, most, valid in (("copies", 1000, "at least 1"), ("degree", 2, "1 or 2")):
+        value = top.take(key, int)
+        if value is not None and not 1 <= value <= most:
+            raise top.fail(f"{key} must be {valid}; got {value}.", key)
+        changes |= {} if value is None else {key: value}
     solve = _solve(top.table("solve"))
     top.close(OPTIONS)
     with top.about():
@@ -211,12 +210,18 @@ def _found(top: Table, parts: list[Any], reading: Reading) -> list[Table]:
 
 
 def _free(part: Any) -> Any:
-    """The mesh of a part with those boundaries that neither supports nor loads use."""
-    used = {getattr(own, "boundary", "") for own in (*part.supports, *part.loads)}
-    named = part.mesh.boundaries or {}
-    return replace(
-        part.mesh, _boundaries={name: own for name, own in named.items() if name not in used}
-    )
+    """The mesh of a part with those boundaries that share no facet with those of supports and
+    loads, and are not the whole surface where there are others.
+    """
+    named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
+    used = [
+        named[own.boundary] for own in (*part.supports, *part.loads) if hasattr(own, "boundary")
+    ]
+    taken = np.concatenate([np.zeros(0, dtype=int), *used])
+    whole = len(part.mesh.boundary_facets())
+    free = {name: own for name, own in named.items() if not np.isin(own, taken).any()}
+    parts = {name: own for name, own in free.items() if len(np.unique(own)) < whole}
+    return replace(part.mesh, _boundaries=parts or free)
 
 
 def _contact(table: Table, parts: list[Any], reading: Reading) -> Contact:

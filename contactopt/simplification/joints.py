@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.problem import Pair
+from contactopt.problem.laws import find_law
 from contactopt.readings.constants import COARSEST
 from contactopt.readings.quantities import elastic_energy
 from contactopt.scenes.scene import Scene
@@ -35,7 +36,9 @@ def offered_joints(scene: Scene, solved: Solved) -> list[Simplification]:
     """Pairs under Coulomb's law, but one, that a coarse solution lets tie or be frictionless."""
     tied, smooth = [], []
     for contact, pair in zip(scene.pairs, solved.reduction.problem.pairs):
-        if contact.law == "coulomb" and np.any(solved.reduction.problem.mu[pair.contacts] > 0):
+        if find_law(contact.law).plain_coulomb() and np.any(
+            solved.reduction.problem.mu[pair.contacts] > 0
+        ):
             if _rubbing(solved, pair) <= SMOOTH:
                 smooth.append(contact.name)
             elif _use_of_friction(solved, pair, contact.mu) <= SHARE:

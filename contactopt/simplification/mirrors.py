@@ -37,7 +37,7 @@ def mirrored(whole: Whole) -> tuple[list[Simplification], list[str]]:
             " count as a plane of symmetry, too."
         )
         return [], [*notes, told]
-    if not planes and not notes and uncut and whole.scene.kind != "axisymmetric":
+    if not planes and not notes and uncut and not whole.scene.analysis.revolved:
         notes.append(NONE)
     found: list[Simplification] = []
     for plane in planes:
@@ -95,8 +95,9 @@ def _candidates(whole: Whole) -> Iterator[Plane]:
     """Planes that could be planes of symmetry; those across the axes of space come first."""
     points, dim = whole.points, whole.scene.dim
     axes = np.eye(dim)
-    known = [axes[1]] if whole.scene.kind == "axisymmetric" else [*axes]
-    if whole.scene.kind != "axisymmetric":
+    revolved = whole.scene.analysis.revolved
+    known = [axes[1]] if revolved else [*axes]
+    if not revolved:
         principal = np.linalg.eigh(np.cov(points))[1].T
         known += [axis for axis in principal if np.all(np.abs(np.abs(axes @ axis) - 1) > ACROSS**2)]
     for normal in known:

@@ -26,6 +26,7 @@ from scipy.spatial import KDTree
 from contactopt.bodies import assemble
 from contactopt.bodies.assembly import Assembly
 from contactopt.coupling.coupling import Coupling, couple, law_of
+from contactopt.coupling.crosspoints import independent
 from contactopt.problem.certificate import Yardsticks, yardsticks
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
@@ -57,9 +58,12 @@ def certificate_of_whole(
     try:
         moves = {each.name: spread.displacement(each, bodies[each.name]) for each in whole.parts}
         forces = {name: np.zeros(len(U)) for name, U in moves.items()}
-        for pair in whole.pairs:
+        sides = [(pair, *(bodies[name] for name in pair.bodies)) for pair in whole.pairs]
+        couplings = independent(
+            whole.pairs, [couple(whole, *both) for both in sides], bodies.values()
+        )
+        for pair, made in zip(whole.pairs, couplings):
             upper, lower = pair.bodies
-            made = couple(whole, pair, bodies[upper], bodies[lower])
             r, measure = spread.reactions(pair, made)
             u = (made.upper @ moves[upper] - made.lower @ moves[lower]).reshape(r.shape)
             u[:, 0] += made.gap
@@ -121,7 +125,10 @@ class Spread:
         pairs = self.part.reduction.problem.pairs
         number = next(i for i, own in enumerate(pairs) if own.name == key[1])
         there, own = self.part.reduction.couplings[number], pairs[number].contacts
-        contacts = _nearest(there.positions, x)
+        # two contacts at a corner differ in their normals
+        towards = np.einsum("kab,ka->bk", turns, made.frames[:, 0])
+        aside = NEAR * float(np.ptp(there.positions, axis=1).max(initial=0.0))
+        contacts = _nearest(there.positions + aside * there.frames[:, 0].T, x + aside * towards)
         force = np.einsum("kac,ka->kc", there.frames, self.part.solution.reactions[own])[contacts]
         # A contact of the part stands for several of the whole, or for a slice of one.
         share = made.areas / np.where(there.areas > 0, there.areas, np.inf)[contacts]

@@ -12,6 +12,7 @@ import skfem
 
 from contactopt.bodies.body import check_mesh
 from contactopt.meshes.cells import SHAPES
+from contactopt.problem.laws import find_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part, Rigid, Scene
 from contactopt.simplification.constants import BETWEEN
@@ -52,7 +53,7 @@ class Whole:
             element = SHAPES[mesh.refdom.__name__][1][self.scene.degree]()
             numbers[name] = skfem.Dofs(mesh, element)
         for pair in self.scene.pairs:
-            if pair.law != "tied":
+            if find_law(pair.law).bounded:
                 contacts += max(
                     len(numbers[body].get_facet_dofs(self.meshes[body].boundaries[at]).flatten())
                     for body, at in self.surfaces(pair)

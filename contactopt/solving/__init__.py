@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from contactopt.errors import Unbalanced
 from contactopt.scenes.scene import Scene
 from contactopt.solving.follow import follow_path
 from contactopt.solving.solve_scene import Options, Solved
@@ -27,5 +28,10 @@ def solve_states(
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)
     own = options or Options()
-    path = follow_path(states, elements, None, own)
+    try:
+        path = follow_path(states, elements, None, own)
+    except Unbalanced as error:
+        if error.path is None:
+            raise
+        path = error.path  # what the states before it have found is an answer, too
     return Solved(path.reduction, path.solution, path=path)

@@ -5,17 +5,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sized
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.cards import count
-from contactopt.errors import InputError
-from contactopt.methods.driver import TOL
+from contactopt.defaults import TOL
+from contactopt.errors import InputError, Unbalanced
+from contactopt.problem import Solution, Status
+from contactopt.readings.plate_motions import motion
 from contactopt.readings.resultants import columns
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult, State
+from contactopt.solving.sliding import sliding, sliding_words
 from contactopt.solving.solve_scene import Options, Solved, solve_loaded, solve_scene
 
 Forces = list[tuple[np.ndarray, np.ndarray]]
@@ -62,43 +66,64 @@ def follow(
 def follow_path(
     scenes: Iterable[Scene], elements: int | None, zone: float | None, options: Options
 ) -> PathResult:
-    """Solve a load path with options for all states.
-
-    Parameters
-    ----------
-    scenes, elements, zone : as for follow(), and so are the errors
-    options : how each state is solved
-
-    Returns
-    -------
-    PathResult : the states with their solutions, in their order
-    """
+    """Solve a load path with the same options for all states; the errors are those of follow()."""
     total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
     solved: Solved | None = None
+    failed: Solution | None = None
     bodies: Forces | None = None
     for scene in scenes:
         said = getattr(scene, "state", "")  # what is no scene is told below
         named = f"state {len(states) + 1}{total}{said and f' ({said})'}"
         if solved is None:
             once = isinstance(scenes, Sized) and len(scenes) == 1
-            solved = solve_scene(scene, elements, zone, options, once=once)
+            now = solve_scene(scene, elements, zone, options, once=once)
         else:
-            try:
-                solved = solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
-            except InputError as error:
-                raise InputError(f"{named}: {error}") from error
+            now = _next_state(scene, named, solved, states, options)
+        steps = count(now.solution.iterations, "iteration")
+        options.note(f"{named}: {now.solution.status}, {steps}")
+        if states and not now.solution.solved:
+            failed = _ended(now, states, named)
+            break
+        solved = now
         state, bodies = state_of(solved, states[-1] if states else None, bodies)
         states.append(state)
-        steps = count(state.solution.iterations, "iteration")
-        options.note(f"{named}: {state.solution.status}, {steps}")
         if not state.solution.solved:
             break
         if options.restart is not None:
             options.restart.finished(state.solution)
     if solved is None:
         raise InputError("the path has no states; give at least one scene.")
-    return PathResult(tuple(states), solved.reduction)
+    return PathResult(tuple(states), solved.reduction, failed)
+
+
+def _next_state(
+    scene: Scene, named: str, solved: Solved, states: list[State], options: Options
+) -> Solved:
+    """The next state of a path; an InputError names it, and a load that nothing holds comes with
+    the path so far.
+    """
+    try:
+        return solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
+    except InputError as error:
+        raised = type(error)(f"{named}: {error}")
+        if isinstance(raised, Unbalanced):
+            last = replace(
+                states[-1].solution, status=Status.INFEASIBLE, residual=np.inf, message=str(raised)
+            )
+            raised.path = PathResult(tuple(states), solved.reduction, last)
+        raise raised from error
+
+
+def _ended(now: Solved, states: list[State], named: str) -> Solution:
+    """The last iterate of a state that was not solved; its message says where the path ends."""
+    solution, before = now.solution, f"state {len(states)}"
+    slid = sliding(now.reduction.problem, solution, states[-1].solution)
+    if slid is None:
+        message = f"{named}: {solution.message}; numbers and files are those of {before}"
+    else:
+        message = sliding_words(slid, now.reduction.scene, named, before)
+    return replace(solution, message=message)
 
 
 def state_of(
@@ -118,7 +143,7 @@ def state_of(
     now = [(own, body.external_forces(own)) for body, own in zip(reduction.bodies, U)]
     # before the first state are the unloaded bodies
     u0, r0 = (gap, 0.0) if before is None else (before.displacements, before.solution.reactions)
-    moved = problem.displacements(0 * r, solution.multipliers) + earlier - gap
+    risen, shifted = (motion(reduction, U, component) for component in (0, 1))
     steps = zip(now, last or [(0 * own, 0 * force) for own, force in now])
     here = all(isinstance(own, np.ndarray) for own in U) and sum(own.size for own in U) <= KEPT
     state = State(
@@ -128,7 +153,8 @@ def state_of(
         problem.s,
         slip + earlier,
         slip[:, 1:],
-        np.average(moved, axis=0, weights=problem.areas),
+        np.nan if risen is None else risen.value,
+        np.nan if shifted is None else shifted.value,
         elastic=sum(body.energy(own) for body, own in zip(reduction.bodies, U)),
         external=sum(float((F + F0) @ (own - U0)) for (own, F), (U0, F0) in steps) / 2,
         contact=-float(np.sum((r + r0) * (slip + earlier - u0))) / 2,

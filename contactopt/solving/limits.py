@@ -8,8 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.checks import check_number
 from contactopt.readings.constants import MOST_MEMORY
+from contactopt.scenes.scene import Scene
+from contactopt.solving.progress import resident_memory
 
 GIGABYTE = 1e9
 
@@ -48,3 +51,13 @@ class Limits:
         elif memory > self.memory * GIGABYTE:
             takes = f"about {memory / GIGABYTE:.2g} GB of memory, more than {self.memory:g} GB"
         return takes and f"to go on would take {takes}"
+
+
+def too_large(scene: Scene, why: str) -> str:
+    """The sentence for a run that took all the memory there was."""
+    bodies = count(len(scene.parts), "body", "bodies")
+    held = f"{resident_memory() / 1e9:.2g} GB were taken when more was asked for"
+    return (
+        f"scene '{scene.name}' of {bodies} with elements = {scene.elements} needs more memory than"
+        f" there is: {held}{f' ({why})' if why else ''}; take fewer elements."
+    )

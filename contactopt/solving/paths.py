@@ -48,12 +48,11 @@ class State:
     q, s           of the step's problem: q_t is measured from the state before [length], [force]
     displacements  u (k, dim), total: gap, tangential displacement [length];  slip (k, dim - 1) of
                    this step [length]
-    apart          (dim,) relative displacement of the bodies, had they no contact: minus approach,
-                   shift [length]
+    risen, shifted   motions of the upper bodies along the mean normal and t1
+                   (contactopt.readings.plate_motions) [length]; not a number where there is none
     elastic        elastic energy of both bodies; external: midpoint work of this step; contact: D
                    [force length]
-    bodies         displacements (n,) of every body [length]; empty for large bodies, and for those
-                   on other ranks
+    bodies         displacements (n,) of every body [length]; empty for large bodies
     columns        name -> number: loads, motions, resultants
                    (contactopt.readings.resultants.columns)
     """
@@ -64,7 +63,8 @@ class State:
     s: np.ndarray
     displacements: np.ndarray
     slip: np.ndarray
-    apart: np.ndarray
+    risen: float
+    shifted: float
     elastic: float
     external: float
     contact: float
@@ -81,11 +81,14 @@ class State:
 class PathResult:
     """A solved path; `reduction` belongs to its last state, with the problem of the last step.
 
-    If a step is not solved the path ends with it: what would follow has no state to start from.
+    If a step is not solved the path ends before it: what would follow has no state to start from.
+    `failed` is then how that step ended, with its last iterate. A path whose first step is not
+    solved has that one alone.
     """
 
     states: tuple[State, ...]
     reduction: Reduction
+    failed: Solution | None = None
 
     def __repr__(self) -> str:
         scene, solved = self.states[-1].scene, sum(state.solution.solved for state in self.states)
@@ -102,26 +105,34 @@ class PathResult:
 
     @property
     def solved(self) -> bool:
-        return all(state.solution.solved for state in self.states)
+        return self.failed is None and all(state.solution.solved for state in self.states)
 
     @property
     def solution(self) -> Solution:
-        """The last state's, with the seconds of the whole path."""
+        """The last state's, with the seconds of the whole path. Where a step failed, it says how:
+        status, residual, message and iterations are those of that step.
+        """
         seconds: Counter[str] = Counter()
-        for state in self.states:
-            seconds.update(state.solution.seconds)
-        return replace(self.states[-1].solution, seconds=dict(seconds))
+        for own in self.solutions:
+            seconds.update(own.seconds)
+        found = replace(self.states[-1].solution, seconds=dict(seconds))
+        if self.failed is None:
+            return found
+        how = {
+            key: getattr(self.failed, key)
+            for key in ("status", "residual", "message", "iterations")
+        }
+        return replace(found, **how)
+
+    @property
+    def solutions(self) -> list[Solution]:
+        """Those of all states, and that of the step that failed."""
+        failed = [] if self.failed is None else [self.failed]
+        return [*(state.solution for state in self.states), *failed]
 
     def problem(self, step: int) -> InterfaceProblem:
-        """Make the static problem of one step, which its solution is certified against.
-
-        Parameters
-        ----------
-        step : The number of the state, from 0 on.
-
-        Returns
-        -------
-        The problem with the gaps and resultants of that state.
+        """The static problem of one step, with its gaps and resultants, which its solution is
+        certified against. Steps count from 0.
         """
         return replace(self.reduction.problem, q=self.states[step].q, s=self.states[step].s)
 
@@ -154,15 +165,8 @@ class PathResult:
         return history
 
     def fields(self, step: int) -> tuple[Fields, ...]:
-        """Compute displacement and stress of the elastic bodies at a state.
-
-        Parameters
-        ----------
-        step : The number of the state, from 0 on.
-
-        Returns
-        -------
-        Those of each elastic body; none where the state keeps no displacements.
+        """Displacement and stress of each elastic body at a state; none where it keeps no
+        displacements.
         """
         pairs = zip(self.reduction.bodies, self.states[step].bodies)
         return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)
@@ -170,10 +174,6 @@ class PathResult:
     def write_history(self, file: Path) -> None:
         """Write the history as comma-separated values, one row per state, with the names of the
         steps of the path in its last column.
-
-        Parameters
-        ----------
-        file : The file.
         """
         with open(file, "w", newline="") as opened:
             rows = csv.writer(opened)
@@ -184,16 +184,8 @@ class PathResult:
             rows.writerows(zip(*history.values()))
 
     def at(self, step: int) -> tuple[Reduction, Solution]:
-        """Find the problem and the solution of a state.
-
-        Parameters
-        ----------
-        step : The number of the state, from 0 on.
-
-        Returns
-        -------
-        The reduction with the problem of the step, whose bodies carry the loads of the last state,
-        and the solution.
+        """The reduction with the problem of a step, whose bodies carry the loads of the last state,
+        and the solution of the step.
         """
         state = self.states[step]
         reduction = replace(self.reduction, problem=self.problem(step), scene=state.scene)
@@ -201,14 +193,10 @@ class PathResult:
 
     def write(self, out: str | Path) -> None:
         """Write history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and
-        displacements (n, k, dim).
+        displacements (n, k, dim). The folder is made if it does not exist.
 
-        It also has the bounds of the friction forces (n, k), the status (n, k): 0 open, 1 stick, 2
-        slip, and the contact frames (k, dim, dim), one direction per row, normal first.
-
-        Parameters
-        ----------
-        out : The folder, which is made if it does not exist.
+        path.npz also has the bounds of the friction forces (n, k), the status (n, k): 0 open, 1
+        stick, 2 slip, and the contact frames (k, dim, dim), one direction per row, normal first.
         """
         problem = self.reduction.problem
         forces = [state.solution.reactions for state in self.states]
@@ -236,8 +224,8 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
     return {
         "normal_force": float(r[:, 0].sum()),
         "shear_force": -float(r[:, 1].sum()),
-        "approach": -float(state.apart[0]),
-        "shift": float(state.apart[1]),
+        "approach": 0.0 - state.risen,
+        "shift": state.shifted,
         "contact_half_width": edges[0],
         "stick_half_width": edges[1],
         "contact_nodes": int(status.touching.sum()),

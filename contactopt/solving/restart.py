@@ -143,7 +143,7 @@ class Restart:
     file   where it is kept from time to time; None: nowhere
     known  states to start from
     path   whether the run has a load path
-    done   the solved states so far;  now: the last iterate of the state that is being solved
+    done   the states that are solved on the present mesh;  now: the last iterate of the next one
     zone   half-width of the contact zone in this run; 0 without one
     """
 
@@ -158,7 +158,11 @@ class Restart:
     pause: float = PATIENCE
 
     def begin(self, reduction: Reduction) -> None:
-        """A state of this reduction will be solved."""
+        """A state of this reduction will be solved. On another mesh than the one before it is the
+        first state.
+        """
+        if self.reduction is None or reduction.couplings is not self.reduction.couplings:
+            self.done = []
         self.reduction, self.now = reduction, None
 
     def start(self, reduction: Reduction) -> Solution | None:
@@ -185,6 +189,11 @@ class Restart:
         """The present state is solved."""
         self.done.append((solution.reactions, solution.multipliers))
         self.now = None
+
+    def ended(self, reduction: Reduction, solutions: Sequence[Solution]) -> None:
+        """The run has these answers, in the order of its states, whatever it solved after them."""
+        self.reduction, self.now = reduction, None
+        self.done = [(own.reactions, own.multipliers) for own in solutions]
 
     def stopped(self, note: Callable[[str], None]) -> None:
         """Write what a run has found before it was stopped."""

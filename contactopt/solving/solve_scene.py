@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 
 from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.linear.budget import NextBest, TooDear, open_budget
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator, loosened
-from contactopt.methods.driver import TOL, solve
+from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.transfer import transfer
@@ -30,6 +31,7 @@ from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
 from contactopt.solving.progress import progress_lines
 from contactopt.solving.restart import Restart, certified
+from contactopt.solving.sliding import sliding, sliding_words
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
@@ -38,21 +40,16 @@ STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselv
 
 @dataclass(frozen=True)
 class Options:
-    """How scenes are solved, whatever loop goes around it.
+    """How scenes are solved, whatever loop goes around it. The fields not named here are arguments
+    of contactopt.reduce and contactopt.solve.
 
-    Attributes
-    ----------
-    Q : form of the interface operator, as for contactopt.reduce
-    solver : of the bodies' linear systems, as for contactopt.reduce
-    method : as for contactopt.solve
-    tol : bound on the natural-map residual; above the usual one the last step comes no further, and
-        what is read off the bodies is as accurate
-    settings : further arguments of contactopt.solve: limits, and settings of a method that is given
-        by its name
-    note : receives one short sentence before every step that takes time, and in long solves one
-        after each iteration
-    restart : keeps what is found on the way, and may give a start
-    until : when solves end that are not done yet, on the clock time.perf_counter() [s]
+    tol        above the usual one the last step comes no further, and what is read off the bodies
+               is as accurate
+    settings   further arguments of contactopt.solve
+    note       receives one short sentence before every step that takes time, and in long solves
+               one after each iteration
+    restart    keeps what is found on the way, and may give a start
+    until      when solves end that are not done yet, on the clock time.perf_counter() [s]
     """
 
     Q: str = "auto"
@@ -200,9 +197,7 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
 def _solved(
     reduction: Reduction, start: Solution | None, options: Options, earlier: Mapping[str, float]
 ) -> Solved:
-    """The solution of a reduced scene, with the seconds of the reduction, of the solve and of what
-    came earlier.
-    """
+    """The solution of a reduced scene, with the seconds of all that came earlier."""
     lines = progress_lines(options.note, reduction.problem, options.tol)
     if options.restart is not None:
         options.restart.begin(reduction)
@@ -228,6 +223,9 @@ def _solved(
     doubts = [0.0] if len(found) == 1 else [_doubt(*pair) for pair in found]
     ranks = range(len(found), 0, -1) if doubts[0] > BEARABLE else doubts
     reduction, solution = min(zip(ranks, found), key=lambda one: (not one[1][1].solved, one[0]))[1]
+    if not solution.solved and (slid := sliding(reduction.problem, solution, None)):
+        words = sliding_words(slid, reduction.scene, "the scene", "")
+        solution = replace(solution, message=f"{words} ({solution.message})")
     return Solved(
         _knowing(reduction, solution, options.tol), replace(solution, seconds=dict(seconds))
     )

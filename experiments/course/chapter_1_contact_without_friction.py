@@ -187,7 +187,8 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 # This program has no constraint any more, but the node sinks into the floor. If the load is large
 # enough to close the gap, $F > k g_0$, the minimum is at $u = -(F - k g_0) / (k + \kappa)$. A
 # larger $\kappa$ makes this error smaller. But when contact begins, the stiffness of the system
-# jumps by the factor $1 + \kappa / k$. Such jumps make large penalty problems hard to solve.
+# jumps by the factor $1 + \kappa / k$. Written in displacements, large penalty problems are therefore
+# badly conditioned. Written in forces they are not, as chapter 3 shows.
 #
 # ## Nitsche: exact without a multiplier
 #
@@ -314,6 +315,9 @@ assert (
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
 # mechanics. `hint("1.1")` gives a hint, three times, and then the solution. `table(1)` shows what
 # you have done since the notebook was started. The first three need pen and paper only.
+#
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
 #
 # **1.1** (Pen and paper.) A spring of stiffness 4.4 N/mm holds a node 0.6 mm above the floor. A
 # load of 6.5 N pulls it down. How large are the gap and the contact force?

@@ -116,6 +116,8 @@ _ = ax.axis("off")
 #
 # $$ |r_t| \le g, \qquad u_t \ne 0 \;\Rightarrow\; r_t = -g\, \frac{u_t}{|u_t|} . $$
 #
+# (Friction opposes a velocity. Chapter 5 shows why the law of a step asks for $u_t$.)
+#
 # If the friction force is below its bound, the node does not move: it *sticks*. If the node moves,
 # it *slips*. Then the friction force has reached its bound and points against the slip. The two
 # programs in `cvxpy`:
@@ -153,9 +155,81 @@ assert np.allclose(
 )  # from 2 N on the node sticks: u = 0
 
 # %% [markdown]
+# ## Why Coulomb's law has no energy
+#
+# Coulomb's law says that the bound is $g = \mu r_n$. Then no convex program has the solutions as its
+# minima, and there is not even an energy. This section shows why. It explains all the iterations of
+# this course.
+#
+# **A convex energy makes forces fall.** Let the force be minus the slope of a convex function, $r =
+# -\varphi'(u)$. The slope of a convex function never decreases. So for any two states
+#
+# $$ (r - r')'(u - u') \;\le\; 0 . $$
+#
+# This is called *monotone*. Tresca's law is monotone. In both states $r_t u_t = -g |u_t|$, and a
+# force within the bound does no more work than that on any other slip: $-r_t u_t' \le g |u_t'|$ and
+# $-r_t' u_t \le g |u_t|$. Multiply out, and everything cancels:
+#
+# $$ (r_t - r_t')(u_t - u_t') \;\le\; -g|u_t| - g|u_t'| + g|u_t'| + g|u_t| \;=\; 0 . $$
+#
+# The normal parts give $-r_n u_n' - r_n' u_n \le 0$.
+#
+# **Coulomb's law is not monotone.** Take two states that both touch the floor and slip forwards:
+#
+# $$ r = (10, -10 \mu), \quad u = (0, 1) \qquad \text{and} \qquad r' = (1, -\mu), \quad u' = (0, 2) . $$
+#
+# Each obeys Coulomb's law, but $(r - r')'(u - u') = (-9\mu)(-1) = 9 \mu > 0$. The second state slips
+# further and resists less. So there is *no convex energy*.
+#
+# **There is no other energy either.** Let the floor be a spring, $r_n = \kappa h$ at the depth $h =
+# -u_n$, and let the node slip forwards, so that $r_t = -\mu \kappa h$. Then $r_t$ depends on $u_n$, but
+# $r_n$ does not depend on $u_t$. The forces of an energy have symmetric derivatives. Or go round a
+# closed loop: at the depth $h$ from the slip 1 mm to 2 mm, up to the depth 0, back to the slip 1 mm,
+# and down again. The normal force gives back all its work. Friction takes $\mu \kappa h$ times 1 mm
+# on the way out, and nothing on the way back. A force with an energy does no work on a closed loop.
+
+
+# %% tags=["hide-input"]
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(6.6, 3.2), layout="constrained"
+)
+for force, color in ((10, "C0"), (1, "C1")):
+    step = np.array([0.5, 0.5, -0.5, -0.5]) * force
+    left.plot([-2.6, 0, 0, 2.6], step, color, label=f"$r_n$ = {force} N")
+left.plot([1, 2], [-5, -0.5], "C3o--")
+left.annotate("this line rises", (1.5, -2.7), (-2.4, -3.6), color="C3")
+left.set(xlabel="slip $u_t$ [mm]", ylabel="friction force $r_t$ [N]")
+left.set_title("Coulomb's law, $\\mu$ = 0.5")
+left.legend(frameon=False, loc="upper right")
+right.fill([1, 2, 2, 1], [1, 1, 0, 0], color="C3", alpha=0.2, lw=0)
+for tail, head in (
+    ((1, 1), (2, 1)),
+    ((2, 1), (2, 0)),
+    ((2, 0), (1, 0)),
+    ((1, 0), (1, 1)),
+):
+    arrow(right, tail, head, color="C3")
+right.text(1.08, 1.06, r"friction takes $\mu \kappa h \cdot$ 1 mm", color="C3")
+right.text(1.3, -0.13, "no friction", color="C3")
+right.set(xlabel="slip $u_t$ [mm]", ylabel="depth / $h$ [-]")
+right.set(xlim=(0.7, 2.3), ylim=(-0.25, 1.25), title="a closed loop")
+_ = right.set_yticks([0, 1])
+
+# %% [markdown]
+# **What follows.** The law can still be written in three ways, and every method uses one of them.
+#
+# - *A fixed point.* Tresca's program with the bound $g$ has an answer $r_n(g)$. Find the bound with $g
+#   = \mu r_n(g)$.
+# - *A quasi-variational inequality.* Find $r$ in $C(r)$ such that $(Q r + q)'(s - r) \ge 0$ for all
+#   $s$ in $C(r)$. The set $C(r) = \{s : s_n \ge 0,\ |s_t| \le \mu r_n\}$ depends on the answer. That
+#   is what "quasi" means. With a fixed set this would be a convex program.
+# - *Complementarity.* Let $n$ be the unit vector of the normal direction. Find $r$ in the cone $|r_t|
+#   \le \mu r_n$ such that $u + \mu |u_t|\, n$ lies in the dual cone and is orthogonal to $r$. (The
+#   *dual cone* holds the vectors on which no force of the cone does negative work.)
+#
 # ## Coulomb: the bound depends on the answer
 #
-# Coulomb's law says that the bound is $g = \mu r_n$. Neither program takes a bound that contains
+# Neither program takes a bound that contains
 # its own answer. If we write $\mu r_n$ into the constraint of the dual, we get another law, as we
 # shall see below. But we can guess $g$, solve the program, set $g = \mu r_n$, and solve again,
 # until nothing changes. This is *Tresca's iteration*.
@@ -262,8 +336,8 @@ assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
 #
 # ## What fails
 #
-# **The iteration fails.** With $\mu = 1.5$ the node still has exactly one solution, and slips to
-# the right. In Tresca's iteration the new normal force is $r_n = 3 - g$, and the next bound is $\mu
+# **The iteration fails.** With $\mu = 1.5$ the node still has exactly one solution for this load,
+# and slips to the right. In Tresca's iteration the new normal force is $r_n = 3 - g$, and the next bound is $\mu
 # (3 - g)$, as long as the node slips. So every iteration multiplies a small error of the bound by
 # $-\mu$. For $\mu > 1$ a small error grows. It does not grow for ever: as soon as the bound is
 # larger than 2 N, the node sticks with $r_n = 1$ N, whatever the bound is. So the iteration ends in
@@ -302,9 +376,11 @@ assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
 #
 # $$ \frac{\mu\, (\mu Q_{tt} - Q_{nt})}{Q_{nn} - 2 \mu Q_{nt} + \mu^2 Q_{tt}} . $$
 #
-# This factor is below $+1$ exactly if $\mu Q_{nt} < Q_{nn}$, which is also the condition of a
-# unique solution. So strong friction alone does no harm: for our node, with $Q_{nt} = -1$, the
-# factor stays between 0 and 1 for every $\mu$. But if the directions are nearly parallel, $Q_{nt}^2 >
+# This factor is below $+1$ exactly if $\mu Q_{nt} < Q_{nn}$. If the node slips to the left, $Q_{nt}$
+# changes its sign in both formulas. So both directions are safe from $+1$ exactly if $\mu |Q_{nt}| <
+# Q_{nn}$, and this is also the condition under which every load has a single solution. For our node
+# $Q_{nt} = -1$. If it slips to the right, the factor stays between 0 and 1 for every $\mu$: strong
+# friction alone does no harm. But if normal and tangential motion are strongly coupled, $Q_{nt}^2 >
 # \tfrac89 Q_{nn} Q_{tt}$, the factor falls below $-1$ for some coefficients. Then the iteration runs
 # in a cycle, although the solution is unique.
 
@@ -371,6 +447,9 @@ assert len(all_solutions(InterfaceProblem(Q, [[0.1, -0.5]], 0.9))) == 1
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
 # mechanics. `hint("2.1")` gives a hint, three times, and then the solution. `table(2)` shows what
 # you have done since the notebook was started.
+#
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
 #
 # **2.1** (Pen and paper.) Let $Q = \operatorname{diag}(1.2, 2.5)$ mm/N, $q = (-1.5, 1.1)$ mm and
 # $\mu = 0.3$. Find the normal force and the friction force.
@@ -444,6 +523,25 @@ check("2.8", answer)
 answer = (..., ..., ...)  # r_n, r_1, r_2 [N]
 check("2.9", answer)
 
+# %% [markdown]
+# **2.10** (Pen and paper.) Two states of one node with $\mu = 0.35$ touch the floor and slip
+# forwards. The first has $r_n = 7.4$ N and $u_t = 0.3$ mm, the second $r_n = 2.6$ N and $u_t = 1.1$
+# mm. How large is $(r - r')'(u - u')$?
+
+# %% tags=["exercise"]
+answer = ...  # product [N mm]
+check("2.10", answer)
+
+# %% [markdown]
+# **2.11** (Pen and paper.) A floor is a spring of 30 N/mm, and $\mu = 0.35$. A node is pushed 0.04
+# mm into it, goes from the slip 0.5 mm to 2.2 mm, is lifted to the depth 0.01 mm, goes back to 0.5
+# mm, and is pushed down again. As in the text, $r_t = -\mu r_n$ wherever $u_t > 0$, on the way back
+# too. How much work does the node lose to friction on this loop?
+
+# %% tags=["exercise"]
+answer = ...  # lost work [N mm]
+check("2.11", answer)
+
 # %%
 table(2)
 
@@ -457,7 +555,7 @@ table(2)
 #   friction problem via convex optimization, *ZAMM* 91 (2011),
 #   [doi:10.1002/zamm.201000073](https://doi.org/10.1002/zamm.201000073).
 #
-# Next: [many nodes without friction](chapter_3_a_string_on_a_floor.py).
+# Next: [duality](chapter_7_duality.py), where the second program is derived.
 
 # %% tags=["remove-cell"]
 plt.show()  # opens the figures where this runs as a script

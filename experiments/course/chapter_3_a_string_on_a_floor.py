@@ -292,6 +292,65 @@ assert gap.min() > 0 and errors[-1] < 5e-3
 # gives way under its weight. The string of the proximal method never touches the floor, and comes
 # closer in every step.
 #
+# ## Penalty in two forms
+#
+# Some books say that a penalty makes a problem badly conditioned. Others say that it makes it
+# *better* conditioned. Both are right: they speak of two forms of the same equations.
+#
+# Let all springs have the stiffness $k_p = \kappa h$ per node, and let $P$ pick the nodes that touch
+# (a matrix with one row for each of them). The *stiffness form* has the displacements $u$ as its
+# unknowns. A touching node feels the string and its spring:
+#
+# $$ (A + k_p P'P)\, u = A d - w . $$
+#
+# The *compliance form* has the forces $r = -k_p P u$ of the springs as its unknowns. The gap of a
+# touching node is $P(Q P' r + q)$, and it is also $-r / k_p$. So
+#
+# $$ (P Q P' + \tfrac{1}{k_p} I)\, r = -P q . $$
+#
+# Both give the same answer. But $k_p$ enters in opposite ways. In the stiffness form it adds a
+# *large* number to some eigenvalues of $A$, so that the largest one grows with $k_p$. In the compliance
+# form it adds a *small* number, $1 / k_p$, to all eigenvalues of $Q_c = P Q P'$:
+#
+# $$ \operatorname{cond} = \frac{\lambda_{\max}(Q_c) + 1/k_p}{\lambda_{\min}(Q_c) + 1/k_p} . $$
+#
+# This is always smaller than the condition number of $Q_c$, which the exact floor has. A soft
+# penalty makes it nearly one. A stiff one leaves it as it is.
+
+# %%
+touching = active_set(Q, q)[0] > 0
+P = np.eye(len(x))[touching]
+springs = 10.0 ** np.arange(0, 8)  # N/mm for each node
+stiffness_form = [np.linalg.cond(A + k_p * P.T @ P) for k_p in springs]
+Q_c = P @ Q @ P.T
+compliance_form = [
+    np.linalg.cond(Q_c + np.eye(len(Q_c)) / k_p) for k_p in springs
+]
+
+k_p = 1e4
+soft = np.linalg.solve(A + k_p * P.T @ P, A @ np.full(len(x), d) - weight)
+forces = np.linalg.solve(Q_c + np.eye(len(Q_c)) / k_p, -P @ q)
+assert np.allclose(forces, -k_p * P @ soft)  # the same answer
+assert max(compliance_form) <= np.linalg.cond(Q_c) * (1 + 1e-9)
+assert stiffness_form[-1] > 1e4 * stiffness_form[0] / 10
+
+# %% tags=["hide-input"]
+fig, ax = plt.subplots(figsize=(5.4, 3.4), layout="constrained")
+ax.loglog(springs, stiffness_form, "C3o-")
+ax.loglog(springs, compliance_form, "C0s-")
+ax.axhline(np.linalg.cond(Q_c), color="C0", ls="--", lw=1)
+ax.text(4e4, 2e5, "displacements", color="C3", ha="right")
+ax.text(4, 6, "forces", color="C0")
+ax.text(1.2, 1.2 * np.linalg.cond(Q_c), "forces, exact floor", color="C0")
+_ = ax.set(
+    xlabel="spring of one node $k_p$ [N/mm]", ylabel="condition number [-]"
+)
+
+# %% [markdown]
+# So a code that works with displacements pays for a stiff penalty, and a code that works with forces
+# gains by a soft one. Neither gets the exact answer. The price of accuracy is paid either in the
+# condition number or in the depth below the floor.
+#
 # ## What fails
 #
 # **A decision from a rough answer is wrong.** The solver that we use here is an interior-point
@@ -335,6 +394,9 @@ assert np.isclose(conditions[80] / conditions[40], 4, rtol=0.02)
 # Replace `...` by your answer and run the cell. It says what is wrong with your answer in terms of
 # mechanics. `hint("3.1")` gives a hint, three times, and then the solution. `table(3)` shows what
 # you have done since the notebook was started.
+#
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
 #
 # **3.1** (Pen and paper.) The ends of the string are only 0.07 mm above the floor. At which
 # distance from the end does the contact begin?
@@ -401,6 +463,23 @@ check("3.7", answer)
 # %% tags=["exercise"]
 answer = ...  # condition number [-]
 check("3.8", answer)
+
+# %% [markdown]
+# **3.9** (Pen and paper.) The eigenvalues of $Q_c$ lie between 0.013 and 1.9 mm/N. What is the
+# condition number of the compliance form with a penalty spring of 24 N/mm at each node?
+
+# %% tags=["exercise"]
+answer = ...  # condition number [-]
+check("3.9", answer)
+
+# %% [markdown]
+# **3.10** (Program.) Only the middle one of three nodes touches the floor. The string has four
+# elements of $L = 1$ mm and $T = 1$ N. What is the condition number of the stiffness form with a
+# spring of 700 N/mm at this node?
+
+# %% tags=["exercise"]
+answer = ...  # condition number [-]
+check("3.10", answer)
 
 # %%
 table(3)

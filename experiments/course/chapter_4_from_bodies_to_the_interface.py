@@ -373,6 +373,9 @@ assert np.isclose(floating.s.min(), -4.0)  # the load, downwards
 # mechanics. `hint("4.1")` gives a hint, three times, and then the solution. `table(4)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **4.1** (Pen and paper.) A mesh of the block has $41 \times 21$ nodes, and its top row is held.
 # How many free unknowns does the primal problem have? How many unknowns does the dual problem with
 # friction have?

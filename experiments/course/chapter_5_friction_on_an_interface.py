@@ -220,8 +220,7 @@ assert steps < 20 and np.allclose(
 # the contact force of the last iteration to the force of the spring. By repetition it removes the
 # error, although $\kappa$ is moderate.
 #
-# Now we compare five methods. Each is asked for a certificate of $10^{-2}$, and then for smaller and
-# smaller ones.
+# Now we compare five methods. Each runs to the tolerances $10^{-2}$ to $10^{-8}$ of the certificate.
 
 # %%
 fig, ax = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -234,11 +233,14 @@ for name, label in (
 ):
     points = []
     for tol in (1e-2, 1e-4, 1e-6, 1e-8):
-        begin = time.perf_counter()
-        found = solve(problem, name, tol=tol, time_limit=3.0)
-        points.append((time.perf_counter() - begin, max(found.residual, 1e-14)))
+        seconds = []
+        for _ in range(3):  # the best of three
+            begin = time.process_time()
+            found = solve(problem, name, tol=tol, time_limit=3.0)
+            seconds.append(time.process_time() - begin)
+        points.append((min(seconds), max(found.residual, 1e-14)))
     ax.semilogy(*np.transpose(points), "o-", mfc="none", label=label)
-ax.set(xlabel="time [s]", ylabel="certificate [-]")
+ax.set(xlabel="CPU time [s]", ylabel="certificate [-]")
 ax.legend(frameon=False, fontsize=8)
 
 assert solve(problem, "augmented_lagrangian").solved
@@ -247,8 +249,8 @@ assert errors[0] > 5 * errors[1] > 25 * errors[2]
 
 # %% [markdown]
 # A chart like this one asks the right question: *how long does each method take to reach the same
-# certificate?* Every point is one run on the machine that drew the figure, so that small
-# differences of time say nothing. A fair comparison repeats each run, and uses many problems, as
+# certificate?* Every point is the best of three runs on the machine that drew the figure,
+# so that small differences of time say nothing. A fair comparison uses many problems, as
 # `contactopt bench` does.
 #
 # ## What more friction does
@@ -287,6 +289,74 @@ Slider(
 # %% [markdown]
 # Where the two curves meet, the nodes slip. With more friction the slip zone shrinks towards the
 # edge. In the end all nodes stick.
+
+# %% [markdown]
+# ## A load path: why $u_t$ is the slip of a step
+#
+# Friction opposes the *velocity* of the slip: $r_t = -\mu r_n\, v / |v|$ with $v = \dot u_t$, if $v
+# \ne 0$. So far we wrote $u_t$ in its place. This needs a reason.
+#
+# Let the loads change so slowly that inertia does not matter. (This is called *quasistatic*.) Divide
+# the way of the loads into steps. At the end of the last step the tangential displacement was
+# $u_t^{\text{old}}$. In the new step we replace the velocity by a difference:
+#
+# $$ v \approx \frac{u_t - u_t^{\text{old}}}{\Delta t} . $$
+#
+# Coulomb's law asks only whether $v$ is zero, and for its direction. The duration $\Delta t > 0$ has
+# no influence on either, so it cancels. The law of the step is the law that we know, with the *slip of
+# the step* $u_t - u_t^{\text{old}}$ in place of $u_t$. Since $u_t = (Q r + q)_t$, the slip of the step
+# is
+#
+# $$ u_t - u_t^{\text{old}} \;=\; (Q\, r)_t + (q_t - u_t^{\text{old}}) . $$
+#
+# So *every step is the same problem with another $q$*: subtract from $q_t$ what has slipped before.
+# The gap $u_n$ is not a difference, because contact has no memory. In the first step nothing has
+# slipped yet, and $u_t$ is the slip. This is what all programs above assume.
+#
+# One step is as good as many if no contact changes the direction of its slip on the way, and none
+# that has slipped sticks again. Otherwise the way matters. Here a node is pressed with 2 N, and pulled
+# to the right, to the left and to the right again.
+
+
+# %%
+def along(path, mu=0.5):
+    slipped, forces = 0.0, []
+    for pull in path:
+        step = InterfaceProblem(np.eye(2), [[-2.0, pull - slipped]], mu)
+        forces.append(solve(step).reactions[0, 1])
+        slipped = pull + forces[-1]  # u_t = Q r + q, since the beginning
+    return forces
+
+
+path = np.concatenate(
+    [np.linspace(0, 3, 13), np.linspace(3, -3, 25), np.linspace(-3, 3, 25)]
+)
+frictions = along(path)
+once, later = along([0.0])[0], frictions[25]  # both at the pull 0
+print(f"at the pull 0: {once:.1f} N at first, {later:.1f} N on the way back")
+
+assert np.isclose(path[25], 0) and abs(once) < 1e-9 and np.isclose(later, 1.0)
+lost = np.trapezoid(-np.array(frictions[12:]), path[12:])
+assert np.isclose(lost, 4 * 1.0 * (3.0 - 1.0), rtol=1e-3)
+
+# %% tags=["hide-input"]
+fig, ax = plt.subplots(figsize=(5.4, 3.4), layout="constrained")
+ax.fill(path[12:], frictions[12:], color="C3", alpha=0.15, lw=0)
+ax.plot(path, frictions, "C0.-", ms=4)
+ax.plot(0, once, "ko")
+ax.plot(0, later, "C3o")
+ax.annotate("one step", (0, 0), (8, -12), textcoords="offset points")
+ax.annotate(
+    "same load, later", (0, later), (-25, 8), textcoords="offset points"
+)
+ax.text(-1.4, -0.55, "area: lost work", color="C3")
+ax.set(xlabel="pull $q_t$ [mm]", ylabel="friction force $r_t$ [N]")
+_ = ax.set(ylim=(-1.35, 1.35))
+
+# %% [markdown]
+# The friction force at a load is not known from the load. It depends on the way, and each cycle costs
+# work: this is *hysteresis*. contactopt follows such paths with bodies, too
+# ([a load cycle](../tutorials/a_load_cycle.py)).
 #
 # ## What fails: no solution
 #
@@ -336,6 +406,9 @@ assert solve(
 # mechanics. `hint("5.1")` gives a hint, three times, and then the solution. `table(5)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **5.1** (Pen and paper.) A sledge is pressed down with 130 N and pulled with 23 N. What is the
 # smallest friction coefficient with which it stands still?
 
@@ -363,7 +436,7 @@ check("5.3", answer)
 # **5.4** (Program.) Measure the factor by which the certificate of Tresca's iteration falls from
 # one step to the next. (Run `solve(problem, "tresca", tol=1e-13)`. Its `history` has an entry for
 # every step, with the certificate as `"residual"`.) Your factor is compared with the one that
-# `diagnose` predicts.
+# `diagnose` predicts, and may differ from it by 4 percent.
 
 # %% tags=["exercise"]
 answer = ...  # factor in one step [-]
@@ -414,6 +487,23 @@ check("5.8", answer)
 # %% tags=["exercise"]
 answer = (..., ..., ..., ...)  # r_n [N], r_plus [N], r_minus [N], sigma [mm]
 check("5.9", answer)
+
+# %% [markdown]
+# **5.10** (Pen and paper.) A node has $Q = \operatorname{diag}(1.4, 0.8)$ mm/N, $q_n = -2.1$ mm and
+# $\mu = 0.4$. It is pulled to $q_t = 2$ mm, and then back to $q_t = 1.3$ mm. How large is the
+# friction force at the end, with its sign?
+
+# %% tags=["exercise"]
+answer = ...  # friction force [N]
+check("5.10", answer)
+
+# %% [markdown]
+# **5.11** (Program.) Pull the node of exercise 5.10 to and fro between $q_t = 2$ and $-2$ mm. How
+# much work does friction take in a full cycle, after the first pull?
+
+# %% tags=["exercise"]
+answer = ...  # lost work [N mm]
+check("5.11", answer)
 
 # %%
 table(5)

@@ -1,11 +1,12 @@
 # %% [markdown]
 # # Chapter 7. Duality
 #
-# Every chapter so far had two programs, one in displacements and one in forces. Both gave the same
+# Chapters 1 and 2 had two programs each, one in displacements and one in forces. Both gave the same
 # answer, and this chapter derives why. It also shows what the second program is good for: the
 # difference of the two values is an error that you can compute without knowing the solution.
 #
-# You need chapter 2. The chapter takes 50 minutes with its exercises.
+# Read this chapter directly after chapter 2: its number does not say its place. The chapter takes 50
+# minutes with its exercises.
 
 # %%
 import sys
@@ -279,6 +280,9 @@ for way in (1.0, 10.0, 100.0, 1000.0):
 # mechanics. `hint("7.1")` gives a hint, three times, and then the solution. `table(7)` shows what
 # you have done since the notebook was started.
 #
+# Give numbers with at least three digits: 0.1 percent is close enough. Counts are exact. Forces and
+# displacements are graded by the certificate, which must be at most $10^{-3}$.
+#
 # **7.1** (Pen and paper.) A penalty of stiffness $\kappa = 4.3$ N/mm replaces the floor: it costs
 # $f(u_n) = \tfrac12 \kappa \max(-u_n, 0)^2$. Its conjugate enters the dual problem as $f^*(-r_n)$.
 # What is $f^*(-r_n)$ for $r_n = 2.9$ N?
@@ -368,7 +372,7 @@ table(7)
 #   mechanics, *Handbook of Numerical Analysis* 4 (1996),
 #   [doi:10.1016/S1570-8659(96)80005-6](https://doi.org/10.1016/S1570-8659(96)80005-6).
 #
-# This is the end of the course. The tutorials go on from here. Each of them has one subject.
+# Next: [many nodes without friction](chapter_3_a_string_on_a_floor.py).
 
 # %% tags=["remove-cell"]
 plt.show()  # opens the figures where this runs as a script

@@ -6,6 +6,7 @@ import numpy as np
 
 from contactopt import InterfaceProblem
 from experiments.course.feedback import Forces
+from experiments.course.quantities import Numbers, by_hand
 
 f = 8.0  # N/mm: the weight per length of the chapter's string, 1 mm long, under 1 N
 
@@ -67,6 +68,11 @@ def sweep(together: bool = False, sweeps: int = 1) -> np.ndarray:
     return r
 
 
+def middle_spring(stiffness: float = 700.0) -> np.ndarray:
+    """The stiffness form of exercise 3.10."""
+    return string(4)[0] + stiffness * np.diag([0.0, 1.0, 0.0])
+
+
 def carried() -> np.ndarray:
     return touching(*string(40, 0.19)[1:])
 
@@ -76,14 +82,13 @@ a = np.sqrt(2 * 0.07 / f)
 
 GRADED = {
     "3.1": (
-        lambda: a,
+        None,
         (a / np.sqrt(2), "The parabola is f x^2 / (2 T): a factor of two is missing."),
         (0.5 - a, "This is the distance from the middle. Give that from the end."),
         (2 * a, "This is the length that hangs at both ends together."),
-        (0.07 / f, "A height over a weight per length is no length: look at the units."),
     ),
     "3.2": (
-        lambda: 1 - 2 * a,
+        None,
         (1 - a, "The string hangs at both ends."),
         (2 * a, "This is the part that the ends carry."),
         (f * (1 - 2 * a), "This is a force [N]. Divide it by the whole weight f L."),
@@ -105,28 +110,50 @@ GRADED = {
         ),
     ),
     "3.5": (
-        sweep,
+        lambda: Numbers(sweep(), least=(0.0, "The floor only pushes: no force is negative.")),
         (lambda: sweep(True), "This is Jacobi: each node must see the new force of the last one."),
         (lambda: sweep(sweeps=200), "This is the solution. One sweep does not reach it."),
         (lambda: sweep(sweeps=2), "This is the result of two sweeps."),
         (lambda: sweep()[::-1], "order"),
     ),
-    "3.6": (
-        lambda: f / 0.0003,
-        (f / 0.0003 / 40, "This is the spring of one node [N/mm]. Asked is that per length."),
-        (0.0003 / f, "You divided the wrong way: a stiffness is a load over a depth."),
-        (0.25 / 0.0003, "The height d does not push; the weight f does."),
-    ),
     "3.7": (
-        lambda: float(carried().sum()),
+        lambda: Numbers(
+            float(carried().sum()),
+            formulas=("f * (1 - 2 * sqrt(2 * T * d / f))",),
+            given={"f": f, "T": 1.0, "d": 0.19, "N": 40.0},
+            least=(0.0, "If the floor rises, the string is lifted: the energy grows."),
+            most=(f, "The floor cannot carry more than the whole weight."),
+        ),
         (f, "This is the whole weight. The ends carry a part of it."),
         (lambda: carried().mean(), "The floor rises below all nodes: add their forces."),
         (lambda: carried().max(), "This is the force on one node. Add all of them."),
     ),
-    "3.8": (
-        lambda: 1 / np.tan(np.pi / 2000) ** 2,
-        (1e6, "It grows like N^2; the factor is missing."),
-        (4e6, "The largest eigenvalue is about 4, the smallest is not 1 / N^2."),
-        (1 / np.tan(np.pi / 2000), "This is its square root."),
+    "3.10": (
+        lambda: Numbers(
+            float(np.linalg.cond(middle_spring())),
+            given={"k_p": 700.0, "N": 4.0},
+            least=(1.0, "A condition number is at least one."),
+        ),
+        (lambda: np.linalg.cond(middle_spring(0.0)), "This is A alone: the spring is missing."),
+        (
+            lambda: np.linalg.cond(string(4)[0] + 700 * np.eye(3)),
+            "This has a spring at every node, and only the middle one touches.",
+        ),
+        (
+            lambda: np.linalg.cond(string(4)[1] + np.eye(3) / 700),
+            "This is the compliance form. Asked is the stiffness form.",
+        ),
+        (
+            lambda: np.linalg.cond(string(4)[0] / 4 + 700 * np.diag([0, 1, 0])),
+            "The stiffness of an element is T / h, and h is a quarter of 1 mm.",
+        ),
+        (
+            lambda: np.linalg.cond(middle_spring(700 / 4)),
+            "The 700 N/mm are those of the spring of the node: no length belongs to them.",
+        ),
+        (
+            lambda: 700 / np.linalg.eigvalsh(middle_spring())[0],
+            "The largest eigenvalue is more than the spring: the string adds to it.",
+        ),
     ),
 }

@@ -7,7 +7,9 @@ import numpy as np
 
 from contactopt import InterfaceProblem, Material, laws, models, solve
 from contactopt.analytic import contact_modulus, hertz_point
-from experiments.course.feedback import Displacements, Numbers
+from contactopt.methods.preconditioners.circulant import seminorm
+from experiments.course.feedback import Displacements
+from experiments.course.quantities import Numbers, by_hand
 
 RUBBER = Material(E=5.5, nu=0.42)
 NODE = np.array([[1.0, 0.2, -0.1], [0.2, 1.5, 0.3], [-0.1, 0.3, 2.0]])
@@ -27,6 +29,15 @@ def angle(facets: int) -> float:
     return float(np.degrees(np.arctan2(*-program.variables["r"].value[:0:-1])))
 
 
+def symbol(m: int) -> np.ndarray:
+    """The symbol of the sparse circulant, for the waves 0 ... 2 m - 1."""
+    return np.fft.fft(seminorm(m)).real
+
+
+def stiffer(m: int, j: int) -> float:
+    return float(symbol(m)[j] / symbol(m)[1])
+
+
 def peak(P: float) -> float:
     return hertz_point(P, 400.0, contact_modulus(RUBBER)).peak
 
@@ -44,54 +55,36 @@ def moved(law: laws.Law | float = 0.45, factor: float = 1.0) -> np.ndarray:
 
 GRADED = {
     "6.1": (
-        lambda: gigabytes(120 * 80),
+        None,
         (gigabytes(120 * 80, 1), "Each node has three components of force."),
         (gigabytes(120 * 80) / 8, "A number takes 8 bytes."),
         (gigabytes(120 * 80) / 1.024**3, "These are GiB, 1024^3 bytes. Asked are 10^9 bytes."),
     ),
-    "6.2": (
-        lambda: int(np.ceil(np.pi / np.arccos(0.993))),
-        (26, "With 26 facets a little more than 0.7 % is lost."),
-        (54, "From the middle of a facet to its corner it is pi / m, and not 2 pi / m."),
-        (14, "From the middle of a facet to its corner it is pi / m, and not pi / (2 m)."),
-    ),
-    "6.3": (
-        lambda: Numbers(peak(260.0) / peak(100.0), close=0.01),
-        (2.6, "The area grows, too, so that the peak grows more slowly than the load."),
-        (2.6**0.5, "This is Hertz's law for a cylinder. Under a sphere the area grows faster."),
-        (2.6 ** (2 / 3), "This is the factor of the area."),
-    ),
     "6.4": (
-        lambda: angle(8),
-        (50.0, "This is the direction of the circle. A polygon has its own directions."),
-        (22.5, "This is the next corner on the other side; 50 degrees is farther from it."),
-        (45.0, "This is the middle of a facet. Friction goes into a corner."),
-    ),
-    "6.5": (
-        lambda: contact_modulus(RUBBER),
-        (5.5 / (1 - 0.42**2) / 2, "This holds for two equal bodies. A rigid one gives no way."),
-        (5.5 / (2 * (1 + 0.42)), "This is the shear modulus."),
-        (5.5 / (1 - 0.42), "It is 1 - nu^2, and not 1 - nu."),
-    ),
-    "6.6": (
-        lambda: 2 * 0.2 / (6.0 * 2 * np.pi / 3.0),
-        (0.2 / (6.0 * 2 * np.pi / 3.0), "half"),
-        (2 * 0.2 / (6.0 * 3.0), "The wave number is 2 pi over the wavelength."),
-        (2 * 0.2 / 6.0 / (2 * np.pi / 3) ** 2, "This divides by the square: that is the string."),
-        (2 * 0.2 / 6.0 * (2 * np.pi / 3), "A surface gives way *less* to short waves."),
-    ),
-    "6.7": (
-        lambda: int(np.ceil(np.sqrt(900) / 2 * np.log(2e6))),
-        (6529, "Conjugate gradients feel the square root of the condition number."),
-        (436, "half"),
-        (208, "The bound is 2 q^j, and the 2 counts."),
+        lambda: Numbers(
+            angle(8),
+            given={"pull": 50.0, "facets": 8.0, "right_angle": 90.0},
+            least=(0.0, "Asked is an angle between 0 and 90 degrees."),
+            most=(90.0, "Asked is an angle between 0 and 90 degrees."),
+        ),
     ),
     "6.8": (
         lambda: Displacements(node()),
         (lambda: moved(0.0), "frictionless"),
         (lambda: moved(laws.Associated(0.45)), "associated"),
         (lambda: moved(factor=-1.0), "along"),
-        ((0.0, 0.0, 0.0), "bound"),
         (lambda: node().q[0], "penetration"),
+    ),
+    "6.10": (
+        lambda: Numbers(
+            stiffer(64, 21),
+            given={"j": 21.0, "m": 64.0},
+            least=(1.0, "Short waves are stiffer than long ones."),
+        ),
+        (lambda: stiffer(128, 21), "This is m = 128: the circle has 2 m = 128 nodes."),
+        (lambda: stiffer(32, 21), "This is m = 32: the circle has 2 m = 128 nodes."),
+        (lambda: symbol(64)[21], "This is the symbol itself. Divide by that of one wave."),
+        (lambda: stiffer(64, 20), "Waves are counted from 0, the constant: take the entry 21."),
+        (lambda: stiffer(64, 22), "Waves are counted from 0, the constant: take the entry 21."),
     ),
 }

@@ -9,34 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
 from typing import Any
 
 import numpy as np
 
-from contactopt import InterfaceProblem, laws, natural_map_residual
+from contactopt import InterfaceProblem, laws, natural_map_residual, solve
 from contactopt.problem.certificate import Yardsticks, fit_multipliers, yardsticks
+from experiments.course.quantities import Numbers
+from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, wrong
 
-CLOSE = 1e-3  # relative error of numbers, and certificate of forces, that still counts as right
 HUGE = 1e100  # from here on numbers count as infinite
 TOLD = 0.2  # a condition is told first if its violation is this share of the largest one
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """Whether an answer is right, the kind of its error, what to tell, and the worst contact."""
-
-    right: bool
-    kind: str
-    sentence: str
-    contact: int | None = None
-
-
-RIGHT = Verdict(True, "right", "right.")
-
-
-def wrong(kind: str, sentence: str, contact: int | None = None) -> Verdict:
-    return Verdict(False, kind, f"not right yet. {sentence}", contact)
 
 
 @dataclass(frozen=True)
@@ -58,8 +41,38 @@ class Forces:
             return np.column_stack([answer.ravel(), np.zeros((k, dim - 1))])
         return answer.reshape(k, dim)
 
+    def solution(self) -> np.ndarray:
+        """The right answer, from contactopt."""
+        return solve(self.problem, tol=1e-10).reactions
+
     def verdict(self, answer: np.ndarray) -> Verdict:
-        return judge_forces(self.problem, self.forces(answer))
+        found = judge_forces(self.problem, self.forces(answer))
+        return found if found.right else self._digits(answer) or self._unit(answer) or found
+
+    def _digits(self, answer: np.ndarray) -> Verdict | None:
+        """Whether an answer is the right one with three digits, or with fewer."""
+        right = self.solution()
+        if answer.size != right.size:
+            right = right[:, :1]
+        pairs = list(zip(answer.ravel(), right.ravel(), strict=True))
+        least = CLOSE * np.abs(right).max()
+        for digits, verdict in ((3, RIGHT), (2, DIGITS)):
+            # numbers as given, or all with the same decimal place
+            decimals = digits - 1 - int(np.floor(np.log10(np.abs(right).max())))
+            if all(
+                np.isclose(a, rounded(b, digits), rtol=1e-9, atol=least)
+                or np.isclose(a, round(b, decimals), rtol=1e-9, atol=1e-12)
+                for a, b in pairs
+            ):
+                return verdict
+        return None
+
+    def _unit(self, answer: np.ndarray) -> Verdict | None:
+        for factor in (1e-6, 1e-3, 1e3, 1e6):
+            if judge_forces(self.problem, self.forces(factor * answer)).right:
+                told = f"Your answer is {1 / factor:g} times the right one. Look at the units."
+                return wrong("unit", told)
+        return None
 
 
 @dataclass(frozen=True)
@@ -70,9 +83,13 @@ class Displacements(Forces):
         u = answer.reshape(self.problem.q.shape)
         return np.linalg.solve(self.problem.Q, (u - self.problem.q).ravel()).reshape(u.shape)
 
+    def solution(self) -> np.ndarray:
+        found = solve(self.problem, tol=1e-10)
+        return self.problem.displacements(found.reactions, found.multipliers)
+
     def verdict(self, answer: np.ndarray) -> Verdict:
-        found = judge_forces(self.problem, self.forces(answer))
-        if found.right:
+        found = super().verdict(answer)
+        if found.right or found.kind in ("unit", "digits"):
             return found
         about = "Your displacements need the forces r = K (u - q). With them: "
         return replace(found, sentence=found.sentence.replace("yet. ", f"yet. {about}", 1))
@@ -87,6 +104,10 @@ class State:
     shapes = ((2,),)
 
     def verdict(self, answer: np.ndarray) -> Verdict:
+        found, right = self._judged(answer), Numbers((max(self.q, 0.0), max(-self.q / self.Q, 0.0)))
+        return found if found.right else _simple(right.verdict(answer)) or found
+
+    def _judged(self, answer: np.ndarray) -> Verdict:
         u, r = answer
         length = max(abs(self.q), abs(self.Q * r))
         force = length / self.Q
@@ -106,52 +127,9 @@ class State:
         return RIGHT
 
 
-@dataclass(frozen=True)
-class Numbers:
-    """The answer agrees with numbers to a relative error, or is rounded to three digits; integers
-    are exact.
-    """
-
-    value: Any
-    close: float = CLOSE
-
-    @property
-    def shapes(self) -> list[tuple[int, ...]]:
-        return [np.shape(self.value)]
-
-    def agrees(self, answer: Any, value: Any) -> bool:
-        """Whether two answers are the same to the accuracy that is asked for."""
-        a, b = np.asarray(answer, dtype=float), np.asarray(value, dtype=float)
-        if a.shape != b.shape or np.asarray(self.value).dtype.kind == "i":
-            return np.array_equal(a, b)
-        least = 0.1 * self.close * float(np.abs(b).max(initial=0.0))
-        rounded = np.array([float(f"{x:.3g}") for x in b.ravel()]).reshape(b.shape)
-        same = np.isclose(a, b, rtol=self.close, atol=least) | np.isclose(a, rounded, rtol=1e-12)
-        return bool(same.all())
-
-    def verdict(self, answer: np.ndarray) -> Verdict:
-        value = np.asarray(self.value, dtype=float)
-        if self.agrees(answer, value):
-            return RIGHT
-        if self.agrees(-answer, value):
-            return wrong("sign", "The size is right, the sign is not. Look at the arrows again.")
-        if 1 < value.size <= 5 and any(self.agrees(p, value) for p in permutations(answer)):
-            return wrong("order", "These are the right numbers in a wrong order.")
-        for factor in (1e-6, 1e-3, 1e3, 1e6):
-            if self.agrees(factor * answer, value):
-                return wrong(
-                    "unit", f"Your answer is {1 / factor:g} times the right one. Look at the units."
-                )
-        for factor in (0.5, 2.0):
-            if self.agrees(factor * answer, value):
-                return wrong("half", "A factor of two is missing, or one too many.")
-        good = [i + 1 for i in range(answer.size) if self._part(answer, value, i)]
-        if good and value.size > 1:
-            return wrong("part", f"Of your {value.size} numbers these are right: {good}.")
-        return wrong("number", "This is none of the mistakes that are often made.")
-
-    def _part(self, answer: np.ndarray, value: np.ndarray, i: int) -> bool:
-        return self.agrees(answer.ravel()[i], value.ravel()[i])
+def _simple(verdict: Verdict) -> Verdict | None:
+    """A verdict on numbers, where it is more helpful than one on mechanics."""
+    return verdict if verdict.kind in ("digits", "unit", "half", "right") else None
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -21,7 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.course.feedback import Numbers, Right, Verdict, as_numbers, draw, wrong
+from experiments.course.feedback import Right, as_numbers, draw
+from experiments.course.mistakes import value
+from experiments.course.quantities import Numbers, by_hand
+from experiments.course.verdict import CLOSE, Verdict
 
 FOLDER = Path(__file__).parent
 LEVELS = {1: "pen and paper", 2: "program", 3: "think"}
@@ -32,22 +35,31 @@ class Exercise:
     """One exercise.
 
     number    chapter.number
-    right     computes the right answer: numbers, or one of the kinds of `feedback`
+    right     computes the right answer: numbers, or one of the kinds of `feedback`; None where the
+              record has formulas
     mistakes  answers that are typically wrong, or functions that compute them; and what to tell
               about each of them, or the kind of error that `feedback` finds by itself
     level     1 to 3, in LEVELS
     asks      what the answer holds, with units
     hints     three, each says more
     solution  lines that a student can run in the chapter; they end with the answer
+    formulas  of the numbers of the answer, in the quantities that are given, from which mistakes
+              are made; close is the relative error that counts as right, least and most are bounds
+              that mechanics gives, each with its reason
     """
 
     number: str
-    right: Callable[[], Any]
+    right: Callable[[], Any] | None
     mistakes: tuple[tuple[Any, str], ...]
     level: int
     asks: str
     hints: list[str]
     solution: str
+    formulas: tuple[str, ...] = ()
+    given: dict[str, float] = field(default_factory=dict)
+    close: float = CLOSE
+    least: tuple[float, str] | None = None
+    most: tuple[float, str] | None = None
 
 
 @dataclass
@@ -69,9 +81,17 @@ def exercises(chapter: int) -> dict[str, Exercise]:
     graded = import_module(f"experiments.course.exercises_{chapter}").GRADED
     found = {}
     for number, text in texts.items():
-        right, *mistakes = graded[number]
-        found[number] = Exercise(number, right, tuple(mistakes), **text)
+        right, *computed = graded.get(number, (None,))
+        told = [(wrong_value(one, text), words) for one, words in text.pop("mistakes", ())]
+        found[number] = Exercise(number, right, (*told, *computed), **text)
     return found
+
+
+def wrong_value(formula: Any, text: dict[str, Any]) -> Any:
+    """A wrong answer from its formula, or from one formula for each number of the answer."""
+    if isinstance(formula, str):
+        return value(formula, text.get("given", {}))
+    return tuple(wrong_value(one, text) for one in formula)
 
 
 def exercise(number: str) -> Exercise:
@@ -86,8 +106,12 @@ def exercise(number: str) -> Exercise:
 @cache
 def right_answer(number: str) -> Right:
     """The right answer as a kind of `feedback`; it is computed once."""
-    value = exercise(number).right()
-    return Numbers(value) if isinstance(value, (int, float, tuple, list, np.ndarray)) else value
+    task = exercise(number)
+    if task.right is None:
+        return by_hand(task.formulas, task.given, task.close, task.least, task.most)
+    found = task.right()
+    plain = isinstance(found, (int, float, tuple, list, np.ndarray))
+    return Numbers(found) if plain else found
 
 
 @cache
@@ -103,13 +127,9 @@ def grade(number: str, answer: Any) -> Verdict:
     given = as_numbers(answer, right, task.asks)
     if isinstance(given, Verdict):
         return given
-    verdict = right.verdict(given)
-    if verdict.right or not isinstance(right, Numbers):
-        return verdict
-    for value, told in mistakes(number):
-        if " " in told and right.agrees(given, value):
-            return wrong("mistake", told)
-    return verdict
+    if isinstance(right, Numbers):
+        return right.verdict(given, mistakes(number))
+    return right.verdict(given)
 
 
 def check(number: str, answer: Any) -> None:

@@ -19,7 +19,7 @@ import jupytext
 from experiments.course.grader import exercise
 
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
-CELL = re.compile(r'^(answer = .*?)  # (.*)\ncheck\("(\d\.\d)", answer\)\n', re.M)
+CELL = re.compile(r'^(answer = .*?)  # (.*)\ncheck\("(\d\.\d+)", answer\)\n', re.M)
 GRADED = """from experiments.course.grader import check, grade
 
 check("{number}", answer)

@@ -27,15 +27,16 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 from skfem.refdom import RefQuad
 
 from contactopt import Material
-from contactopt.accuracy.bound import Bound
-from contactopt.accuracy.composite_element import reference_energy
-from contactopt.accuracy.displaced_stress import bilinear, halved
-from contactopt.accuracy.equilibrated import Simplices
-from contactopt.accuracy.equilibrium_elements import EquilibriumElements
-from contactopt.accuracy.facing_facets import measures
-from contactopt.accuracy.interval import interval
 from contactopt.accuracy.loop import refine
-from contactopt.accuracy.uneven_traction import CONSTANT, regular_simplex
+from contactopt.bounds.bound import Bound
+from contactopt.bounds.composite_element import WEIGHT, reference_stress
+from contactopt.bounds.displaced_stress import bilinear, halved
+from contactopt.bounds.equilibrium_elements import EquilibriumElements
+from contactopt.bounds.facing_facets import measures
+from contactopt.bounds.interval import interval
+from contactopt.bounds.simplices import Simplices
+from contactopt.bounds.tetrahedra import Tetrahedra
+from contactopt.bounds.uneven_traction import CONSTANT, regular_tetrahedron
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.figures.style import COLOURS, LETTERS, MARKS, add_legend, paper_axes
@@ -323,14 +324,14 @@ def _seconds(work: Callable[[], Any]) -> float:
 
 
 def constants() -> list[dict[str, Any]]:
-    """The constant c of contactopt.accuracy.uneven_traction, from above and from below."""
+    """The constant c of contactopt.bounds.uneven_traction, from above and from below."""
     rows = []
-    for dim, halvings in (*((2, k) for k in range(1, 5)), *((3, k) for k in range(1, 4))):
-        n, found = 2**halvings, composite(dim, halvings)
-        points = regular_simplex(dim).mesh.p
-        least = compatible(points, Material(1.0, 0.0), np.eye(dim), halvings)
-        rows.append({"dimension": dim, "n": n, "c_n": found, "c is at most": found / (1 - 1 / n),
-                     "c is at least": least, "in use": CONSTANT[dim]})  # fmt: skip
+    for halvings in range(1, 4):
+        n, found = 2**halvings, composite(halvings)
+        points = regular_tetrahedron().mesh.p
+        least = compatible(points, Material(1.0, 0.0), np.eye(3), halvings)
+        rows.append({"n": n, "c_n": found, "c is at most": found / (1 - 1 / n),
+                     "c is at least": least, "in use": CONSTANT})  # fmt: skip
     return rows
 
 
@@ -342,15 +343,15 @@ def _halved(points: np.ndarray, halvings: int) -> tuple[Any, np.ndarray]:
     return mesh, np.flatnonzero(np.all(plain.p[-1, mesh.facets] < 1e-9, axis=0))
 
 
-def composite(dim: int, halvings: int) -> float:
-    """The largest least energy of composite stresses in a regular simplex under tractions d that
-    are linear on each of its facets, over int |d|^2, where the moments of d are zero.
+def composite(halvings: int) -> float:
+    """The largest least energy of composite stresses in a regular tetrahedron under tractions d,
+    linear on each of its facets, over int |d|^2, where the moments of d are zero.
     """
-    mesh, on = _halved(regular_simplex(dim).mesh.p, halvings)
-    cells, x = Simplices(mesh), mesh.p[:, mesh.t]  # (dim, v, e)
+    mesh, on = _halved(regular_tetrahedron().mesh.p, halvings)
+    dim, cells, x = 3, Tetrahedra(mesh), mesh.p[:, mesh.t]  # (dim, v, e)
     inputs = dim * dim * (dim + 1)  # without the body force
-    form, parts = cells.form(Material(1.0, 0.0), slice(None)), reference_energy(dim)
-    H = np.einsum("eab,abij->eij", form, parts[..., :inputs, :inputs], optimize=True)
+    form, stress = cells.form(Material(1.0, 0.0), slice(None)), reference_stress()[..., :inputs]
+    H = WEIGHT * np.einsum("vai,eab,vbj->eij", stress, form, stress, optimize=True)
     energy = cells.by_moments.T @ sp.block_diag(list(H), "csr") @ cells.by_moments
     motions = [np.broadcast_to(one[:, None, None], x.shape) for one in np.eye(dim)]
     for i, j in combinations(range(dim), 2):

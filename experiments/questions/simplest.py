@@ -30,7 +30,8 @@ from contactopt import (
 from contactopt import natural_map_residual as certificate
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.meshes.structured import rename, tensor_mesh
-from contactopt.readings.quantities import approach, elastic_energy
+from contactopt.readings.plate_motions import approach
+from contactopt.readings.quantities import elastic_energy
 from contactopt.simplification.proof import Spread
 from contactopt.simplification.search import proved_part
 from contactopt.solving.solve_scene import Options, Solved, solve_scene
@@ -152,7 +153,7 @@ def numbers(solved: Solved) -> np.ndarray:
     r = solution.reactions
     energy = elastic_energy(solved.reduction, solution)
     peak = float((r[:, 0] / problem.areas).max())
-    return np.array([energy, approach(problem, solution) or 0.0, peak])
+    return np.array([energy, approach(solved.reduction, solution) or 0.0, peak])
 
 
 def scene_of(number: int) -> tuple[Scene, float]:

@@ -37,6 +37,7 @@ exclude_patterns = [
     "museum.md",
     "lecturers.md",
     "museum/*",
+    "lectures/*",
     "generated/notebooks",
     "**/__pycache__",
 ]

@@ -34,6 +34,8 @@ TUTORIALS = (
     "derivatives_with_kinks",
     "half_space_or_finite_elements",
 )
+# the order in which the chapters are read: duality comes after the first two
+CHAPTERS = (1, 2, 7, 3, 4, 5, 6)
 PICTURE = re.compile(r"!\[(.*?)\]\((?!http)(.*?)\)")
 
 
@@ -123,7 +125,7 @@ def notebook(folder: str, name: str, text: str, head: str = "") -> Iterator[tupl
 GALLERY = """# %% [markdown]
 # # Gallery
 #
-# Thirty programs, each of at most ten statements besides its imports. Each says its class of
+# Short programs, most of at most ten statements besides their imports. Each says its class of
 # mathematical program and its mechanics, asserts what it shows, and draws a figure.
 """
 
@@ -142,10 +144,9 @@ def gallery() -> str:
 
 def course(site: Path) -> Iterator[tuple[Path, str]]:
     """Each chapter twice: with exercises to answer, and with their solutions."""
-    chapters = {
-        path.stem: path.read_text()
-        for path in sorted((ROOT / "experiments" / "course").glob("chapter_*.py"))
-    }
+    folder = ROOT / "experiments" / "course"
+    paths = [next(folder.glob(f"chapter_{number}_*.py")) for number in CHAPTERS]
+    chapters = {path.stem: path.read_text() for path in paths}
     for name, text in chapters.items():
         yield from notebook("course", name, text)
         answers = re.sub(r"^# # (Chapter \d)", r"# # Solutions: \1", solved(text), flags=re.M)

@@ -15,6 +15,7 @@ from markdown_it import MarkdownIt
 FOLDER = Path(__file__).parent / "museum"
 # in the order of a visit
 ROOMS = (
+    "non_monotone",
     "one_node",
     "two_nodes",
     "dragged_plate",
@@ -39,8 +40,7 @@ def anchor(name: str) -> str:
 
 def page(name: str) -> str:
     """A room as one HTML file that loads nothing."""
-    text = (FOLDER / f"{name}.md").read_text().split("\n", 1)[1]
-    hypothesis, rest = re.split(r"^(?=## )", text, maxsplit=1, flags=re.M)
+    _, claim, text = (FOLDER / f"{name}.md").read_text().split("\n\n", 2)
     markdown = MarkdownIt("commonmark", {"html": True})
     scripts = [(FOLDER / f"{part}.js").read_text() for part in ("core", "page", name)]
     doors = "".join(
@@ -51,8 +51,8 @@ def page(name: str) -> str:
         title=title(name),
         style=(FOLDER / "page.css").read_text(),
         rooms=doors,
-        hypothesis=markdown.render(hypothesis),
-        text=markdown.render(rest),
+        claim=markdown.render(claim),
+        text=markdown.render(text),
         script="\n".join([*scripts, "start(room);"]),
     )
 

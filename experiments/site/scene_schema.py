@@ -23,8 +23,8 @@ from contactopt.errors import InputError
 from contactopt.files.toml_table import Place, Table
 from contactopt.run_options import OPTIONS
 from contactopt.scenes.body_shapes import LENGTHS
+from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import STRESSES, library
-from contactopt.scenes.scene import COMPONENTS
 from contactopt.scenes.scene_files import read_scenes
 
 ROOT = Path(__file__).parents[2]
@@ -70,7 +70,7 @@ class Noting(Table):
 def schema() -> dict[str, Any]:
     """The schema of a scene file as a dictionary."""
     asked: dict[Place, list[Asked]] = {}
-    for kind in COMPONENTS:
+    for kind in KINDS:
         for scene in _scenes(kind):
             with suppress(InputError):  # files that are not there
                 read_scenes(partial(Noting, scene, asked), Path("scene.toml"))
@@ -86,7 +86,7 @@ def schema() -> dict[str, Any]:
 
 def _scenes(kind: str) -> list[dict[str, Any]]:
     """Scenes that have every table between them."""
-    axes = COMPONENTS[kind]
+    axes = KINDS[kind].components
     along, both, path = (
         dict.fromkeys(axes, 1.0),
         {a: [0, 1] for a in axes},
@@ -151,7 +151,7 @@ def _object(place: tuple[str, ...], found: dict[tuple[str, ...], list[Asked]]) -
         made["properties"] = {key: _entry(place, key, own, found) for key, own in asked.items()}
     given = {key for key, own in asked.items() if all(one.needed for one in own)} - {"mu"}
     given |= {"mu"} & set(asked) if place else set()  # of the scene only where contacts are found
-    needed = sorted(given - {axis for axes in COMPONENTS.values() for axis in axes})
+    needed = sorted(given - {axis for own in KINDS.values() for axis in own.components})
     return made | ({"required": needed} if needed else {})
 
 

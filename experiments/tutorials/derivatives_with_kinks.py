@@ -21,11 +21,7 @@ import numpy as np
 
 import contactopt
 from contactopt import (
-    HalfSpace,
     InterfaceProblem,
-    Material,
-    Rigid,
-    Scene,
     sensitivity,
     solve,
 )
@@ -197,8 +193,10 @@ assert np.isclose(slip, sensor, rtol=1e-9)
 # From a first guess $\mu > 5/6$ this does not work. The node sticks, the derivative of the slip is
 # zero, and no step is better than another. This is no fault of the method. *Data from a contact
 # that sticks say nothing about the friction coefficient*, except that it is large enough.
-# `contactopt.fit` notices this by the singular values of its Jacobian (the matrix of all
-# derivatives), and says so.
+# A fit notices this by the singular values of its Jacobian, the matrix of all derivatives.
+#
+# Two programs of the gallery use such derivatives: a calibration with confidence intervals, and
+# the design of a punch with an even pressure.
 
 # %%
 problem, solution = solved(1.0)
@@ -327,50 +325,6 @@ assert np.allclose(
 )
 
 # %% [markdown]
-# ## Design: a punch with an even pressure
-#
-# A flat punch presses hardest at its corners. Which profile makes the pressure even?
-# `contactopt.design` minimises the largest pressure. In each step it solves a *linear* program,
-# which uses the derivatives of all pressures with respect to all shapes. The step may not leave a
-# region in which these derivatives can be trusted. It is kept only if the largest pressure of the
-# *certified* solution has really become smaller. The largest of several pressures is a function
-# with kinks as well. In a linear program it becomes a set of constraints, and its kinks do no harm.
-
-# %%
-half, cells = 10.0, 40
-points = half * (2 * np.arange(cells) + 1 - cells) / cells
-flat = HalfSpace("half-plane", Material(5.0, 0.3), points)
-punch = Scene(
-    "punch", Rigid("punch", normal=(0, 1), force={"y": -100.0}), flat, 0.3
-)
-
-
-def shapes(places):
-    return np.stack(
-        [(places[0] / half) ** power for power in (2, 4, 6, 8)], axis=1
-    )
-
-
-designed = contactopt.design(punch, shapes)
-print(
-    f"largest pressure: {[round(one.peak, 2) for one in designed.visits]} MPa;"
-    f" over the mean {designed.unevenness:.3f}"
-)
-
-fig, ax = plt.subplots(figsize=(6, 3.8), layout="constrained")
-ax.plot(
-    points, designed.gap - designed.gap.min(), label="designed profile [mm]"
-)
-ax.plot(points, designed.pressure, label="its pressure [MPa]")
-ax.set(xlabel="place [mm]", ylabel="profile, pressure")
-ax.legend(frameon=False)
-
-assert (
-    designed.unevenness < 1.05 and designed.visits[0].peak > 3 * designed.peak
-)
-assert all(visit.certificate < 1e-9 for visit in designed.visits)
-
-# %% [markdown]
 # ## Exercises
 #
 # **1.** At $q_n = 0$ and $q_t = 0.5$ mm the node just touches the floor. Between which two states
@@ -413,21 +367,5 @@ assert all(visit.certificate < 1e-9 for visit in designed.visits)
 #
 # </details>
 #
-# **3.** Add a constraint to the design: the profile must have the height zero at the rim. Can the
-# largest pressure become smaller by this?
-#
-# <details><summary>Solution</summary>
-#
-# It cannot, because fewer profiles are allowed. The coefficients of the even powers add up to the
-# height at the rim, so the constraint is that their sum is zero.
-#
-# ```python
-# tied = contactopt.design(punch, shapes, constraints=lambda c: [cp.sum(c) == 0])
-# assert abs(tied.profile.sum()) < 1e-6 * np.abs(tied.profile).max()
-# assert tied.peak >= designed.peak * (1 - 1e-3)
-# ```
-#
-# </details>
-
 # %% tags=["remove-cell"]
 plt.show()  # opens the figures where this runs as a script

@@ -6,7 +6,7 @@
 # work on the same problem. In this tutorial a stranger writes such a file without any help from
 # this package. We read the file, look at the problem, solve it, and write a file back.
 #
-# Reading time: 10 minutes. You need `h5py` (`pip install 'contactopt[fclib]'`).
+# Reading time: 10 minutes. You need the extra `fclib`.
 
 # %%
 from pathlib import Path

@@ -54,11 +54,13 @@ def test_a_layer_held_on_its_base_is_pulled_beyond_where_filon_found_it():
     assert brentq(pressure, 0.5, 2.0) == pytest.approx(1.35, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_receding_layer_under_a_wide_load_bears_that_load():
     assert receding_half_width(0.5, 12) == pytest.approx(receding_half_width(0.5), rel=1e-6)
     assert receding_peak(4.0) == pytest.approx(1 / 8, rel=3e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("growth, base, levels, degree", [(1.25, 6, 3, 1), (1.4, 4, 3, 2)])
 def test_the_receding_layer_of_finite_elements_is_that_of_the_integral_equation(
     growth, base, levels, degree
@@ -94,6 +96,7 @@ def test_a_small_contact_on_layers_is_that_of_hertz():
     assert off(1.2e-3) == pytest.approx(4 * off(3e-4), rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cylinder on bonded layer", "cylinder on coated layer"])
 @pytest.mark.parametrize("way", [(1.25, 8, 3, 1), (1.4, 6, 3, 2)])
 def test_cylinders_on_layers_of_finite_elements_are_those_of_the_integral_equation(name, way):
@@ -106,6 +109,7 @@ def test_cylinders_on_layers_of_finite_elements_are_those_of_the_integral_equati
         assert limit.limit == pytest.approx(exact, rel=5e-3 if quantity == "width" else 1e-4)
 
 
+@pytest.mark.slow
 def test_bulk_tension_moves_the_stick_zone_as_hills_and_nowell_found():
     scene = stretched()
     assert scene.reference.half_width < 1e-4 * LARGE
@@ -124,6 +128,7 @@ def test_bulk_tension_moves_the_stick_zone_as_hills_and_nowell_found():
     assert centre_of_friction(solved.reduction, solved.solution) == pytest.approx(exact, rel=0.03)
 
 
+@pytest.mark.slow
 def test_nafems_rounded_punch_rests_on_its_flat_and_a_little_of_its_fillet():
     scene = rounded_punch(40.4, 1.3)
     solved = solve_scene(scene, 4, 40.4, Options(tol=1e-10))
@@ -141,6 +146,7 @@ def test_an_unsolved_mesh_is_no_value(monkeypatch):
         follow_way(Way(stretched(), 4, 3, 1), ("stick",))
 
 
+@pytest.mark.slow
 def test_a_row_says_how_far_two_ways_are_apart():
     classic = next(one for one in classics() if one.name == "press fit")
     small = replace(classic, ways=((0, 4, 3, 1), (0, 3, 3, 2)))

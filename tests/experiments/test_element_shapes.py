@@ -37,6 +37,7 @@ def ripple(cut):
     return np.std(error[x < 0.6])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [False, True])
 def test_hertz_does_not_ripple_in_3d(cut):
     """The error of the pressure is nearly the same at all nodes; contacts at all nodes of quadratic
@@ -50,6 +51,7 @@ def test_hertz_does_not_ripple_in_3d(cut):
         assert len(FACES["RefTet"][3]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [False, True])
 def test_quadratic_elements_need_fewer_unknowns_for_hertz(cut):
     """Largest nodal pressure and approach are closer on a quadratic mesh half as fine, of about as

@@ -52,6 +52,7 @@ def test_a_report_names_the_command_that_writes_it(tmp_path, monkeypatch, capsys
     assert command(tmp_path / "hertz" / "report.md") == ["questions.hertz"]
 
 
+@pytest.mark.slow
 def test_a_question_runs_as_a_command_and_measures_what_it_says():
     """A scene of the search for wrong answers, of which less than all write no report."""
     command = [sys.executable, "-m", "experiments.questions.search_for_wrong_answers", "1"]
@@ -60,6 +61,7 @@ def test_a_question_runs_as_a_command_and_measures_what_it_says():
     assert re.fullmatch(r"0 2 blocks, [\d.]+ s: agrees\n", done.stdout)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["accuracy", "half_spaces"])
 def test_a_question_in_a_folder_is_a_command_too(name):
     """Its functions may be sent to other processes, which cannot import what stands in __main__."""
@@ -67,6 +69,7 @@ def test_a_question_in_a_folder_is_a_command_too(name):
     assert '__name__ == "__main__"' in source and "get_context" not in source
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_readme_shows_what_its_caption_says():
     """Computed dots on exact curves, slip and stick named; away from the corners of the curves,
     where elements blur them.
@@ -109,6 +112,7 @@ def test_every_command_that_is_named_somewhere_exists():
     assert not [(module, path) for module, path in sorted(named) if find_spec(module) is None]
 
 
+@pytest.mark.slow
 def test_what_is_called_exact_of_nearly_symmetric_scenes_is_right():
     from experiments.questions import simplest
 

@@ -1,7 +1,12 @@
-"""The JSON schema that the package prints is what the reader of scene files asks for."""
+"""Files that are made from the package say what it says: the schema of scene files, the names that
+options take.
+"""
 
 import json
+import subprocess
+import sys
 
+from experiments.site import command_names
 from experiments.site.scene_schema import FILE, schema
 
 
@@ -9,3 +14,19 @@ def test_the_schema_is_that_of_the_reader():
     assert json.loads(FILE.read_text()) == json.loads(json.dumps(schema())), (
         "make it anew: python -m experiments.site.scene_schema"
     )
+
+
+def test_options_take_the_names_of_the_tables():
+    assert json.loads(command_names.FILE.read_text()) == command_names.names(), (
+        "make it anew: python -m experiments.site.command_names"
+    )
+
+
+def test_words_need_no_numerical_package():
+    program = (
+        "import sys; from contactopt.cli import make_parser\n"
+        "text = make_parser().format_help()\n"
+        "print([name for name in ('numpy', 'scipy', 'skfem', 'cvxpy') if name in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert told.stdout.strip() == "[]", told.stderr

@@ -19,12 +19,14 @@ def ball(**force: float) -> HalfSpace:
     return HalfSpace("ball", MATERIAL, (ROW,), height=lambda x: -(x[0] ** 2) / 40, **force)
 
 
+@pytest.mark.slow
 def test_twelve_scenes_of_six_kinds_have_one_answer_by_two_ways():
     found = [verdict(seed) for seed in range(12)]
     assert len({one.family for one in found}) == 6
     assert not [(one.seed, one.wrong) for one in found if one.wrong]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["roller", "ball", "pin"])
 def test_an_answer_that_is_two_percent_wrong_is_found(shape):
     case = pressed(np.random.default_rng(1), shape)

@@ -68,6 +68,7 @@ def test_hertz_within_a_thousandth_on_5000_unknowns(kind):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elements", [32, 64])
 def test_the_peak_beside_an_axis_is_of_second_order(elements):
     """The pressure on the first ring of linear elements is of first order."""

@@ -1,4 +1,4 @@
-"""The convex subproblems of a contact problem, as files that solvers of others read.
+"""The convex subproblems of a contact problem, as files that external solvers read.
 
 Each of them is
 

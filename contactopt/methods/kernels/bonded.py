@@ -87,7 +87,8 @@ class Bonded:
             i = np.arange(len(loose))
             matrix.reshape(len(i), d, len(i), d)[i, :, i, :] += rho[loose, None, None] * D[loose]
             right = error[loose].ravel() - blocks(keep, dr[N])[:, 0]
-            z_N = la.solve(matrix, right, overwrite_a=True, check_finite=False)
+            # not of SciPy, which warns of redundant contacts; the certificate judges the answer
+            z_N = np.linalg.solve(matrix, right)
             dr = dr + G @ z_N
             if len(balance):
                 multipliers = multipliers + np.linalg.solve(self.K, self.X[N].T @ z_N)
@@ -111,7 +112,5 @@ def bonded(problem: InterfaceProblem) -> Bonded | None:
 
 
 def last_bonded(problem: InterfaceProblem) -> Bonded | None:
-    """The factors of a problem, in the units of `dimensionless`, if Newton's method made them last
-    for it; else None.
-    """
+    """The factors of a problem made dimensionless, if Newton's method made them last; else None."""
     return next((made for origin, made in tuple(_last) if origin() is problem), None)

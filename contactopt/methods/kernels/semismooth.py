@@ -105,7 +105,7 @@ class Equations:
         factors = factorised(matrix)
         if factors is None:
             return None
-        x = factors.apply(right)
+        x = factors(right)
         if not np.isfinite(x).all():
             return None
         dr[rows] = x[:n]

@@ -8,12 +8,11 @@ array operations and one sparse LU factorisation (SuperLU).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
 from contactopt.linear.operators import Interface
@@ -24,19 +23,8 @@ from contactopt.methods.constants import FULL, SMALL
 PIVOT = 1e-4
 
 
-@dataclass(frozen=True)
-class Solver:
-    """A factorised block system.
-
-    apply  right-hand sides (m, j) -> x (m, j)
-    sign   -> sign of the determinant, 1 or -1
-    """
-
-    apply: Callable[[np.ndarray], np.ndarray]
-    sign: Callable[[], float]
-
-    def __call__(self, right: np.ndarray) -> np.ndarray:
-        return self.apply(right)
+# a factorised block system: right-hand sides (m, j) -> x (m, j)
+Solver: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 def assembled(
@@ -59,16 +47,11 @@ def assembled(
 def factorised(A: np.ndarray) -> Solver | None:
     """The solver with an array A (n, n), which is overwritten; None if A is singular."""
     if not len(A):
-        return Solver(lambda right: right, lambda: 1.0)
+        return lambda right: right
     lu, swapped, info = dgetrf(np.ascontiguousarray(A).T, overwrite_a=True)
     if info:
         return None
-
-    def sign() -> float:
-        swaps = np.count_nonzero(swapped != np.arange(len(lu)))
-        return float(np.prod(np.sign(np.diagonal(lu))) * (-1.0) ** swaps)
-
-    return Solver(lambda right: np.asarray(dgetrs(lu, swapped, right, trans=1)[0]), sign)
+    return lambda right: np.asarray(dgetrs(lu, swapped, right, trans=1)[0])
 
 
 class DenseBlocks:
@@ -161,22 +144,10 @@ class SparseBlocks:
             x[index] = factors.solve(np.ascontiguousarray(right[index]))
             return x
 
-        def sign() -> float:
-            pivots = float(np.prod(np.sign(factors.U.diagonal())))
-            return pivots * _parity(factors.perm_r) * _parity(factors.perm_c)
-
-        return Solver(solve, sign)
+        return solve
 
 
 Blocks = DenseBlocks | SparseBlocks
-
-
-def _parity(order: np.ndarray) -> int:
-    """1 for an even permutation, -1 for an odd one: by its cycles."""
-    n = len(order)
-    graph = sp.csr_array((np.ones(n), (np.arange(n), order)), shape=(n, n))
-    cycles = connected_components(graph)[0]
-    return -1 if (n - cycles) % 2 else 1
 
 
 def block_matrix(Q: Interface, d: int) -> Blocks:

@@ -36,7 +36,6 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from numpy.polynomial.chebyshev import chebvander
 from scipy.sparse.linalg import LinearOperator, cg
-from scipy.spatial import KDTree
 
 from contactopt.errors import InputError
 from contactopt.linear.operators import Interface, diagonal, held
@@ -169,6 +168,8 @@ def degrees(problem: InterfaceProblem) -> list[int]:
     """The degree of the smooth motions of each pair: the distance between two pairs is the median
     over the contacts of one, so that pairs that meet at a corner are not taken for neighbours.
     """
+    from scipy.spatial import KDTree  # late, since it takes long to import
+
     points = [problem.coordinates[:, pair.contacts].T for pair in problem.pairs]
     trees = [KDTree(own) for own in points]
     found = []

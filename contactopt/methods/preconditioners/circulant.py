@@ -34,7 +34,7 @@ def norm(m: float, h: float) -> np.ndarray:
 
 
 def extended(grid: Grid) -> tuple[GridMap, None]:
-    """P21 = E' Q_c E of eq (25) on a line, or the sum P31 of eq (29); the inverse is dear."""
+    """P21 = E' Q_c E of eq (25) on a line, or the sum P31 of eq (29); the inverse is expensive."""
     if grid.closed:
         symbol, smallest = _closed_symbol(*grid.shape)
         return _circular(np.maximum(symbol, smallest / 2)), None

@@ -9,8 +9,8 @@ EIGENVECTORS was chosen by the times of both ways; a solve takes up to thousands
 DISPERSION, CELL and EDGE were chosen for small condition numbers of the deflated `neumann` on the
 bodies of `python -m experiments.questions.preconditioners` (reports/preconditioners/report.md).
 
-WAVES and MOST_WAVES were chosen for few iterations on a body that is cut into thin slices
-(contactopt.scenes.slices).
+WAVES and MOST_WAVES were chosen for few iterations on a body that is cut into thin layers, tied to
+each other (tests/test_krylov.py).
 """
 
 SPLIT = 0.3  # Poisson's ratio of the half-space that is modelled on a surface, whatever the bodies'

@@ -19,10 +19,7 @@ class Bilateral(Law):
 
     mu: np.ndarray
     proportional = True
-
-    @property
-    def lowest(self) -> np.ndarray:
-        return np.full(self.contacts, -np.inf)
+    opens = False
 
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.asarray(self.mu * np.abs(r_n))

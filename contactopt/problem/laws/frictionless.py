@@ -21,6 +21,7 @@ class Frictionless(Law):
     mu: np.ndarray = 0.0  # type: ignore[assignment]
     convex = True
     proportional = True
+    frictional = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -30,7 +30,7 @@ class Mixed(Law):
                 raise InputError(
                     f"a law of {law.contacts} contacts was given for {len(own)} of them."
                 )
-        for flag in ("convex", "proportional", "bounded"):
+        for flag in ("convex", "proportional", "bounded", "opens"):
             object.__setattr__(self, flag, all(getattr(law, flag) for law in self.parts))
         object.__setattr__(self, "dilatant", any(law.dilatant for law in self.parts))
 

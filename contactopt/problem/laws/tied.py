@@ -20,10 +20,8 @@ class Tied(Law):
     mu: np.ndarray = 0.0  # type: ignore[assignment]
     convex = True
     bounded = False
-
-    @property
-    def lowest(self) -> np.ndarray:
-        return np.full(self.contacts, -np.inf)
+    opens = False
+    frictional = False
 
     @property
     def rough(self) -> np.ndarray:

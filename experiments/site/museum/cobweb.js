@@ -1,4 +1,4 @@
-const STEPS = 24;
+const STEPS = 24, LONG = 3000;
 const problemOf = (p) => ({ Q: [[1, p.coupling], [p.coupling, p.q_tt]], q: [p.q_n, p.q_t], mu: p.mu });
 const trescaStep = ({ Q, q, mu }, g) => mu * trescaNode(Q, q, g)[0];
 const coneStep = ({ Q, q, mu }, sigma) => Math.abs(add(times(Q, coneNode(Q, q, mu, sigma)), q)[1]);
@@ -8,6 +8,16 @@ function iterates(f, x) {
   const found = [x];
   for (let i = 0; i < STEPS; i++) found.push(f(found[i]));
   return found;
+}
+
+/* Whether the iteration comes to rest at last. */
+function converges(f, x) {
+  for (let i = 0; i < LONG; i++) {
+    const next = f(x);
+    if (Math.abs(next - x) <= 1e-12 * Math.max(1, x)) return true;
+    x = next;
+  }
+  return false;
 }
 
 const room = {
@@ -43,18 +53,16 @@ const room = {
     const cobweb = (f, letter, unit, name) => {
       const xs = iterates(f, p.start), top = Math.max(1, ...xs) * 1.15, last = xs.slice(-3);
       const path = xs.slice(0, -1).flatMap((x, i) => [[x, i ? x : 0], [x, xs[i + 1]]]);
-      const still = Math.abs(last[2] - last[1]) <= 1e-3 * Math.max(1, last[2]);
-      const words = still ? "comes to rest" : "does not come to rest";
+      const still = converges(f, xs[STEPS]), words = still ? "converges" : "does not converge";
       return [words, still, plot(
-        { x: [0, top], y: [0, top], xlabel: `${letter} ${unit}`, ylabel: `next ${letter} ${unit}`, alt: `Cobweb of the iteration of ${name}: it ${words}. Its last numbers are ${last.map((x) => show(x)).join(", ")}.` },
+        { x: [0, top], y: [0, top], xlabel: `${letter} ${unit}`, ylabel: `next ${letter} ${unit}`, alt: `Cobweb of the iteration of ${name}: it ${words}. Its numbers after ${STEPS} steps are ${last.map((x) => show(x)).join(", ")}.` },
         [{ line: [[0, 0], [top, top]], kind: "thin" }, { line: range(201).map((i) => [(i * top) / 200, f((i * top) / 200)]), kind: "one" }, { line: path, kind: "two" }],
       ), [["one", `one step of ${name}`], ["thin", "diagonal"], ["two", "the iteration"]]];
     };
     const [first, calm, left, leftKey] = cobweb((g) => trescaStep(problem, g), "bound g", "[N]", "Tresca");
     const [second, quiet, right, rightKey] = cobweb((s) => coneStep(problem, s), "slip σ", "[mm]", "Acary and Cadoux");
-    const k = a.forces.length;
     return {
-      verdict: `${k} solution${k === 1 ? "" : "s"}. In ${STEPS} steps Tresca's iteration ${first}, and that of Acary and Cadoux ${second}.`,
+      verdict: `${counted(problem, a.forces.map((r) => ({ r })))}. Tresca's iteration ${first}. Acary and Cadoux's iteration ${second}.`,
       fails: !(calm && quiet),
       figures: [[left, leftKey], [right, rightKey]],
       rows: [

@@ -48,41 +48,28 @@ function combinations(k, count = 4) {
   return range(count ** k).map((code) => range(k).map((i) => Math.floor(code / count ** i) % count));
 }
 
-/* The linear system in (r, lambda) of a combination of states. */
-function system({ Q, q, mu, V, s }, states) {
-  const n = Q.length, p = s.length;
+/* The linear system in r of a combination of states. */
+function system({ Q, q, mu }, states) {
   const A = [], b = [];
-  for (let i = 0; i < n; i++) {
-    const state = states[i >> 1], normal = i % 2 === 0;
-    const row = Array(n + p).fill(0);
-    if (state === OPEN) row[i] = 1;
-    else if (!normal && state >= FORWARD) {
-      row[i] = 1;
-      row[i - 1] = state === FORWARD ? mu : -mu;
-    } else {
-      for (let j = 0; j < n; j++) row[j] = Q[i][j];
-      for (let j = 0; j < p; j++) row[n + j] = V[i][j];
-    }
+  for (let i = 0; i < Q.length; i++) {
+    const state = states[i >> 1], slips = i % 2 === 1 && state >= FORWARD;
+    const row = state === OPEN || slips ? Q.map((_, j) => (i === j ? 1 : 0)) : [...Q[i]];
+    if (slips) row[i - 1] = state === FORWARD ? mu : -mu;
     A.push(row);
-    b.push(state === OPEN || (!normal && state >= FORWARD) ? 0 : -q[i]);
-  }
-  for (let j = 0; j < p; j++) {
-    A.push([...V.map((row) => row[j]), ...Array(p).fill(0)]);
-    b.push(-s[j]);
+    b.push(state === OPEN || slips ? 0 : -q[i]);
   }
   return [A, b];
 }
 
-/* Every solution of a small plane problem with Coulomb's law, by trying all states: [{r, lambda,
-   u, states}], each point once, those with a small first normal force first. */
+/* Every isolated solution of a small plane problem with Coulomb's law, and the ends of every line of
+   solutions, by trying all states: [{r, u, states}], each point once, those with a small first normal
+   force first. */
 function solutions(problem) {
-  const { Q, q, mu, V = Q.map(() => []), s = [] } = problem;
-  const n = Q.length, found = [];
-  for (const states of combinations(n / 2)) {
-    const x = solveLinear(...system({ Q, q, mu, V, s }, states));
-    if (!x) continue;
-    const r = x.slice(0, n), lambda = x.slice(n);
-    const u = add(add(times(Q, r), q), V.map((row) => dot(row, lambda)));
+  const { Q, q, mu } = problem, found = [];
+  for (const states of combinations(Q.length / 2)) {
+    const r = solveLinear(...system(problem, states));
+    if (!r) continue;
+    const u = add(times(Q, r), q);
     const F = 1e-10 * largest(r), L = 1e-10 * Math.max(largest(u), largest(q));
     const holds = states.every((state, i) => {
       const [r_n, r_t, u_n, u_t] = [r[2 * i], r[2 * i + 1], u[2 * i], u[2 * i + 1]];
@@ -92,9 +79,28 @@ function solutions(problem) {
       return state === FORWARD ? u_t >= -L : u_t <= L;
     });
     const same = (one) => largest(add(one.r, r, -1)) <= 1e-8 * Math.max(largest(r), largest(one.r));
-    if (holds && !found.some(same)) found.push({ r, lambda, u, states });
+    if (holds && !found.some(same)) found.push({ r, u, states });
   }
   return found.sort((a, b) => a.r[0] - b.r[0] || a.r[1] - b.r[1]);
+}
+
+/* Whether two of these solutions are the ends of a line of solutions: then its middle is one, too. */
+function continuum({ Q, q, mu }, found) {
+  const obeys = (r) => {
+    const u = add(times(Q, r), q), F = 1e-9 * largest(r), L = 1e-9 * Math.max(largest(u), largest(q));
+    return range(r.length / 2).every((i) => {
+      const [r_n, r_t, u_n, u_t] = [r[2 * i], r[2 * i + 1], u[2 * i], u[2 * i + 1]];
+      const normal = r_n >= -F && u_n >= -L && (r_n <= F || u_n <= L);
+      return normal && Math.abs(r_t) <= mu * r_n + F && (Math.abs(u_t) <= L || Math.abs(r_t + Math.sign(u_t) * mu * r_n) <= F);
+    });
+  };
+  return found.some((a, i) => found.slice(0, i).some((b) => obeys(add(a.r, b.r).map((x) => x / 2))));
+}
+
+/* How many solutions there are, in words. */
+function counted(problem, found) {
+  if (continuum(problem, found)) return "Infinitely many solutions, a whole line of them";
+  return `${found.length || "No"} solution${found.length === 1 ? "" : "s"}`;
 }
 
 /* One node under Tresca's law with the bound g: the minimum of r'Qr/2 + q'r over r_n >= 0 and

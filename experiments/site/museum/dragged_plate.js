@@ -1,5 +1,3 @@
-const problemOf = (p) => ({ Q: [[1, p.coupling], [p.coupling, 1]], q: [p.q_n, 0], mu: p.mu, V: [[0], [1]], s: [p.s] });
-
 const room = {
   sliders: {
     mu: ["Friction coefficient μ [-]", 0, 2, 0.001, 0.3],
@@ -13,8 +11,9 @@ const room = {
     ["Held by the coupling", { mu: 0.6, s: 0.9, q_n: -1, coupling: 0.7 }],
   ],
   answers(p) {
-    const found = solutions(problemOf(p));
-    return { forces: found.length ? found[0].r : null, needed: p.mu > 0 ? Math.abs(p.s) / p.mu : null, given: Math.max(0, p.coupling * p.s - p.q_n) };
+    const given = Math.max(0, p.coupling * p.s - p.q_n); // the balance gives the friction -s
+    const held = p.mu * given >= Math.abs(p.s) * (1 - 1e-12);
+    return { forces: held ? [given, -p.s] : null, needed: p.mu > 0 ? Math.abs(p.s) / p.mu : null, given };
   },
   show(p, a) {
     const high = Math.max(1, a.given * 1.3, Math.min(a.needed ?? 0, 8) * 1.2);
@@ -29,7 +28,7 @@ const room = {
       ],
     );
     return {
-      verdict: a.forces ? `A solution exists: r = (${show(a.forces[0])}, ${show(a.forces[1])}) N.` : "No solution: the normal force that closes the gap is too small to hold the slide.",
+      verdict: a.forces ? `1 solution: r = (${show(a.forces[0])}, ${show(a.forces[1])}) N.` : "No solution: the normal force that closes the gap is too small to hold the slide.",
       fails: !a.forces,
       figures: [[svg, [["ink", "Coulomb's cone"], ["one", "forces that close the gap"], ["two", "forces that balance the slide"]]]],
       rows: [["Normal force that friction needs, |s| / μ [N]", show(a.needed ?? (p.s ? Infinity : 0))], ["Normal force that closes the gap [N]", show(a.given)]],

@@ -51,12 +51,12 @@ const room = {
       [{ line: at(0), kind: "one" }, { line: at(1), kind: "two" }, { line: [[p.iterations, -1e9], [p.iterations, 1e9]], kind: "thin" }],
     );
     const right = plot(
-      { x: [0, MOST], y: limits(log.map((pair) => pair[1])), xlabel: "iteration", ylabel: "log10 of the gap [N mm]", alt: `The gap over ${MOST} iterations; at the end it is ${show(a.last)} N mm.` },
+      { x: [0, MOST], y: limits(log.map((pair) => pair[1])), xlabel: "iteration", ylabel: "log10 of the gap", alt: `The gap over ${MOST} iterations; at the end it is ${show(a.last)} N mm.` },
       [{ line: log, kind: "three" }, { dot: log[p.iterations], kind: "ink" }],
     );
     const short = p.step < 2, small = a.last <= 1e-3 * Math.max(Math.abs(a.best), 1e-12);
     return {
-      verdict: `${short ? "The hypothesis holds: ω < 2." : "The hypothesis is broken: ω ≥ 2."} After ${MOST} iterations the gap is ${show(a.last, 3)} N mm, ${small ? "small" : "not small"} against the value ${show(a.best, 3)} N mm. It is never negative.`,
+      verdict: `${short ? "The hypothesis holds: ω < 2." : "The hypothesis is broken: ω ≥ 2."} After ${MOST} iterations the gap is ${show(Math.max(a.last, 0), 3)} N mm, ${small ? "small" : "not small"} against the value ${show(a.best, 3)} N mm. It is never negative.`,
       fails: !short,
       figures: [[left, [["one", "cost of the displacement"], ["two", "minus the cost of the force"]]], [right, [["three", "gap"], ["ink", "chosen iteration"]]]],
       rows: [[`Value of the displacement, iteration ${p.iterations} [N mm]`, show(a.primal, 8)], ["Value of the force [N mm]", show(a.dual, 8)], ["Gap [N mm]", show(a.gap, 4)], ["Normal forces [N]", a.r.filter((_, i) => i % 2 === 0).map((x) => show(x)).join(", ")]],

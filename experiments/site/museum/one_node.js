@@ -37,9 +37,9 @@ const room = {
       { x: [-wide, wide], y: [-0.1 * high, high], xlabel: "friction rₜ [N]", ylabel: "normal force rₙ [N]", alt: `Forces (normal, friction) of the solutions: ${a.forces.map((r) => `(${r.map((x) => show(x))})`).join(", ")} N.` },
       [{ area: [[0, 0], [-p.mu * high, high], [p.mu * high, high]], kind: "ink" }, ...a.forces.map((r) => ({ dot: [r[1], r[0]], kind: "two" }))],
     );
-    const below = a.threshold === null || p.mu < a.threshold;
+    const below = p.mu * Math.abs(p.coupling) < 1 - 1e-12;
     return {
-      verdict: `${k} solution${k === 1 ? "" : "s"}: ${a.states.join("; ")}. ` + (below ? "The hypothesis holds: μ |Qₙₜ| < Qₙₙ." : "The hypothesis is broken: μ |Qₙₜ| ≥ Qₙₙ."),
+      verdict: `${counted(problemOf(p), a.forces.map((r) => ({ r })))}: ${a.states.join("; ")}. ` + (below ? "The hypothesis holds: μ |Qₙₜ| < Qₙₙ." : "The hypothesis is broken: μ |Qₙₜ| ≥ Qₙₙ."),
       fails: !below,
       figures: [
         [loads, [["one", "open"], ["three", "stick"], ["two", "slips forwards"], ["four", "slips backwards"], ["ink", "the load"]]],

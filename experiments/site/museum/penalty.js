@@ -34,7 +34,7 @@ const room = {
     const { Q, q } = problemOf(p), places = range(NODES).map((i) => (i + 1) / (NODES + 1));
     const shape = (r) => [[0, p.gap], ...add(times(Q, r), q).map((u, i) => [places[i], u]), [1, p.gap]];
     const shapes = plot(
-      { x: [0, 1], y: limits([-0.01, p.gap, ...[a.penalty, a.multiplier].flatMap((r) => shape(r).map((s) => s[1]))]), xlabel: "place along the string [-]", ylabel: "height over the floor [mm]", alt: `The string over the floor. The penalty overlaps by ${show(a.overlapPenalty)} mm, the multiplier by ${show(a.overlapMultiplier)} mm.` },
+      { x: [0, 1], y: limits([-0.01, p.gap, ...[a.penalty, a.multiplier].flatMap((r) => shape(r).map((s) => s[1]))]), xlabel: "place [-]", ylabel: "height over floor [mm]", alt: `The string over the floor. The penalty overlaps by ${show(a.overlapPenalty)} mm, the multiplier by ${show(a.overlapMultiplier)} mm.` },
       [{ line: [[0, 0], [1, 0]], kind: "thin" }, { line: shape(a.exact), kind: "ink" }, { line: shape(a.penalty), kind: "two" }, { line: shape(a.multiplier), kind: "one" }],
     );
     const all = corrected(p, MOST).map((r, i) => [i, Math.log10(Math.max(largest(add(r, a.exact, -1)), 1e-16))]);
@@ -44,7 +44,7 @@ const room = {
     );
     const touches = largest(a.exact) > 0;
     return {
-      verdict: touches ? `The penalty overlaps by ${show(a.overlapPenalty, 3)} mm. With ${p.corrections} corrections the overlap is ${show(a.overlapMultiplier, 3)} mm and the error of the forces ${show(a.error, 3)} N.` : "The string does not touch the floor: all methods agree.",
+      verdict: touches ? `The penalty overlaps by ${show(a.overlapPenalty, 3)} mm. With ${p.corrections} corrections the overlap is ${show(a.overlapMultiplier, 3)} mm and the error of the forces ${show(a.error, 3)} N.` : "There is no contact force, so that all methods agree.",
       fails: touches && p.corrections === 0,
       figures: [[shapes, [["ink", "exact"], ["two", "penalty"], ["one", "multiplier"], ["thin", "floor"]]], [fall, [["one", "error of the multiplier"], ["ink", "chosen"]]]],
       rows: ["exact", "penalty", "multiplier"].map((name) => [`Forces, ${name} [N]`, a[name].map((x) => show(x, 3)).join(", ")]),

@@ -12,7 +12,7 @@ const room = {
   breaks: [["The cylinders slide", { T: 40 }], ["Just before", { T: 29 }]],
   answers(p) {
     const a = Math.sqrt((4 * p.P * p.R) / (Math.PI * p.E)), peak = (2 * p.P) / (Math.PI * a);
-    const share = Math.abs(p.T) / (p.mu * p.P), slides = share > 1;
+    const ratio = Math.abs(p.T) / (p.mu * p.P), share = Math.abs(ratio - 1) < 1e-12 ? 1 : ratio, slides = share > 1;
     const c = slides ? null : a * Math.sqrt(1 - share);
     const x = range(POINTS).map((i) => 1.2 * a * ((2 * i) / (POINTS - 1) - 1));
     const shear = slides ? null : x.map((place) => Math.sign(p.T) * p.mu * (ellipse(place, a, peak) - (c > 0 ? ellipse(place, c, (peak * c) / a) : 0)));
@@ -29,7 +29,7 @@ const room = {
       ],
     );
     return {
-      verdict: a.slides ? `No solution: |T| is larger than μP = ${show(p.mu * p.P)} N/mm. The cylinders slide.` : `The middle sticks: c / a = ${show(a.c / a.a)}.`,
+      verdict: a.slides ? `No solution: |T| is larger than μP = ${show(p.mu * p.P)} N/mm. The cylinders slide.` : a.c === 0 ? "|T| = μP: nothing sticks any more but the middle line. The cylinders are about to slide." : p.T === 0 ? "Everything sticks: without a push there is no friction." : `The middle sticks: c / a = ${show(a.c / a.a)}.`,
       fails: a.slides,
       figures: [[svg, [["two", "friction"], ["thin", "bound of friction"], ["three", "stick zone"]]]],
       rows: [["Half-width of the contact a [mm]", show(a.a)], ["Half-width of the stick zone c [mm]", show(a.c)], ["Peak pressure [MPa]", show(a.peak)], ["Largest friction force μP [N/mm]", show(p.mu * p.P)]],

@@ -1,0 +1,187 @@
+"""Bulk data of Nastran (.bdf, .nas, .fem): nodes, elements, and their properties as groups.
+
+meshio reads no file without BEGIN BULK, such as those of Gmsh, nor elements in large fields, and
+passes over cards and coordinate systems that it does not know. A card has fields between commas, or
+of 8 or 16 characters (a name with *); it goes on in lines that begin with +, * or an empty field.
+Elements without an extent are passed over. A card of an element that is not known is refused, as is
+a node in a coordinate system of its own. The number of its property names the group of an element.
+
+Source: MSC Nastran, Quick Reference Guide, "Bulk data entries".
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from contactopt.errors import InputError
+
+# card -> shape by its number of nodes
+_SHAPES = (
+    ("CTRIA3 CTRIAR CPLSTN3 CPLSTS3", {3: "triangle"}),
+    ("CTRIA6 CPLSTN6 CPLSTS6", {6: "triangle6"}),
+    ("CQUAD4 CQUADR CSHEAR CPLSTN4 CPLSTS4", {4: "quad"}),
+    ("CQUAD8 CPLSTN8 CPLSTS8", {8: "quad8"}),
+    ("CQUAD CQUAD9", {9: "quad9"}),
+    ("CTETRA", {4: "tetra", 10: "tetra10"}),
+    ("CHEXA", {8: "hexahedron", 20: "hexahedron20"}),
+    ("CPENTA", {6: "wedge", 15: "wedge"}),
+    ("CPYRAM", {5: "pyramid", 13: "pyramid"}),
+    ("CROD CBAR CBEAM CTUBE PLOTEL", {2: "line"}),
+)
+ELEMENTS = {card: shapes for cards, shapes in _SHAPES for card in cards.split()}
+SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM")  # whose cards end with their nodes
+CORNERS = {"wedge": 6, "pyramid": 5}
+# the first node of a card: PLOTEL has no property
+FIRST = {"PLOTEL": 2}
+POINTS = re.compile(
+    "CELAS|CDAMP|CMASS|CBUSH|CGAP|CVISC|CONM|CFAST|CWELD|CBEAR|CSEAM|CHBDY|CORD|CREEP|CYSYM|CYJOIN"
+    "|CYAX|CSUPER|CSET|COUPLE|CAERO|CLOAD|CONV|CONVM|CBARAO|CSSCHD|CAMPBLL"
+)
+# the order of meshio: edges along the third axis come last
+HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15]
+Card = tuple[int, list[str]]
+log = logging.getLogger(__name__)
+
+
+def read_bulk_data(path: Path) -> Any:
+    """The mesh of a file, with the properties as groups of elements. InputError with the line of
+    what is not read, ValueError for what is no such file.
+    """
+    import meshio
+
+    reader = _Reader(path)
+    for line, card in _cards(path):
+        reader.take(line, card)
+    if reader.passed:
+        log.warning("%s: elements without extent are left out: %s", path, ", ".join(reader.passed))
+    tags = np.array(sorted(reader.nodes), dtype=np.int64)
+    if not len(tags) or not reader.elements:
+        raise ValueError("it holds no nodes or no elements")
+    points = np.array([reader.nodes[tag] for tag in tags.tolist()])
+    cells, groups = [], []
+    for kind, rows in reader.elements.items():
+        nodes = np.array([row for _, _, row in rows], dtype=np.int64)
+        lost = np.argwhere(~np.isin(nodes, tags))
+        if len(lost):
+            number = nodes[tuple(lost[0])]
+            raise reader.fail(rows[lost[0, 0]][0], f"an element names node {number}, which is not")
+        if kind == "hexahedron20":
+            nodes = nodes[:, HEXAHEDRON]
+        cells.append((kind, np.searchsorted(tags, nodes[:, : CORNERS.get(kind)])))
+        groups.append(np.array([group for _, group, _ in rows], dtype=np.int64))
+    return meshio.Mesh(points, cells, cell_data={"nastran:ref": groups})
+
+
+class _Reader:
+    """nodes: number -> place;  elements: shape -> line, group and nodes of each;  passed: cards"""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.nodes: dict[int, list[float]] = {}
+        self.elements: dict[str, list[tuple[int, int, list[int]]]] = {}
+        self.numbers: set[int] = set()
+        self.passed: set[str] = set()
+
+    def fail(self, line: int, message: str) -> InputError:
+        return InputError(f"mesh file '{self.path}', line {line}: {message}.")
+
+    def whole(self, line: int, word: str) -> int:
+        if not re.fullmatch(r"[+-]?\d{1,10}", word, re.ASCII):
+            raise self.fail(line, f"{word[:40]!r} is no whole number")
+        return int(word)
+
+    def real(self, line: int, word: str) -> float:
+        """A number, whose exponent may lack its letter: 1.5-3."""
+        text = re.sub(r"(?<=[\d.])([+-]\d+)$", r"e\1", word.upper().replace("D", "E"))
+        try:
+            return float(text or 0)
+        except ValueError:
+            raise self.fail(line, f"{word[:40]!r} is no number") from None
+
+    def take(self, line: int, card: list[str]) -> None:
+        name = card[0]
+        if name == "GRID":
+            number, system, *place = [*card[1:], *[""] * 5][:5]
+            if system not in ("", "0"):
+                raise self.fail(line, f"the node is in coordinate system {system}; write it in 0")
+            known = self.whole(line, number)
+            if known in self.nodes:
+                raise self.fail(line, f"node {known} is there twice")
+            self.nodes[known] = [self.real(line, word) for word in place]
+        elif name == "GRDSET" and "".join(card[2:3]) not in ("", "0"):
+            raise self.fail(line, "nodes are in a coordinate system of their own; write them in 0")
+        elif name in ELEMENTS:
+            self._element(line, card)
+        elif POINTS.match(name):
+            self.passed |= set() if name.startswith("CORD") else {name}
+        elif name in ("INCLUDE", "PLOTEL3", "PLOTEL4", "CONROD") or name.startswith("C"):
+            raise self.fail(line, f"the card {name} is not known here; write the mesh without it")
+
+    def _element(self, line: int, card: list[str]) -> None:
+        name, first = card[0], FIRST.get(card[0], 3)
+        shapes = ELEMENTS[name]
+        words = card[first : first + max(shapes)]
+        count = max(shapes) if any(words[min(shapes) :]) else min(shapes)
+        if count not in shapes or len(words) < count or not all(words[:count]):
+            raise self.fail(line, f"the element {name} lacks some of its nodes")
+        nodes = [self.whole(line, word) for word in words[:count]]
+        if name in SOLIDS and any(card[first + count :]):
+            raise self.fail(line, f"the element {name} has more than {count} nodes")
+        number = self.whole(line, card[1])
+        if number in self.numbers:
+            raise self.fail(line, f"element {number} is there twice")
+        self.numbers.add(number)
+        group = self.whole(line, card[2]) if first == 3 and card[2] else 0
+        self.elements.setdefault(shapes[count], []).append((line, group, nodes))
+
+
+def _cards(path: Path) -> Iterator[Card]:
+    """Line and fields of each card of the bulk data, with the lines in which it goes on."""
+    data = path.read_bytes()
+    if b"\0" in data:
+        raise ValueError("it is no text")
+    lines = data.decode("latin-1").splitlines()
+    begin = [n for n, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
+    if len(begin) > 1:
+        raise InputError(f"mesh file '{path}', line {begin[1] + 1}: it holds more than one BEGIN.")
+    card: Card | None = None
+    for number, line in enumerate(lines[begin[0] + 1 :] if begin else lines, 1):
+        number += begin[0] + 1 if begin else 0
+        line = line.split("$")[0].rstrip().expandtabs(8)
+        if not line:
+            continue
+        fields = _fields(line)
+        if line[0] in "+*" or not fields[0]:
+            if card is None:
+                raise ValueError("it begins within a card")
+            card[1].extend(fields[1:])
+            continue
+        if card is not None:
+            yield card
+        if fields[0] == "ENDDATA":
+            return
+        card = number, fields
+    raise InputError(f"mesh file '{path}', line {len(lines)}: it ends before ENDDATA.")
+
+
+def _fields(line: str) -> list[str]:
+    """The name, and the eight fields of a line, four if they are large."""
+    if "," in line:
+        words = [word.strip() for word in line.upper().split(",")]
+        large = words[0].endswith("*")
+        if len(words) <= 10:  # the tenth field says where the card goes on
+            words = [words[0], *(words[1:] + [""] * 8)[: 4 if large else 8]]
+        fields = words
+    else:
+        wide, count = (16, 4) if "*" in line[:8] else (8, 8)
+        text = line.upper().ljust(8 + wide * count)
+        ends = range(8, 8 + wide * count, wide)
+        fields = [text[:8].strip(), *(text[i : i + wide].strip() for i in ends)]
+    fields[0] = fields[0].rstrip("*").strip()
+    return fields

@@ -1,0 +1,107 @@
+"""How far plates bring the bodies of a scene together, and how far they shift them: read from the
+displacements of the nodes under the plates.
+
+The motion of a body is that of its plates, component by component, or of the supports that move it
+where no plate does. A rigid body and a half-space move as a whole. What nothing moves and nothing
+holds moves by its mean displacement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from contactopt.coupling.reduction import Reduction
+from contactopt.problem import Solution
+from contactopt.scenes.scene import Plate
+
+CLOSED = 1e-3  # a mean direction shorter than this is that of a surface around a body
+ROUNDED = 1e-12  # share of the motions of the bodies below which what they make is rounding
+TINY = 1e-15  # share of the extent of the contacts below which a motion is rounding
+
+
+class Motion(NamedTuple):
+    """How far the upper bodies move beyond the lower ones along a mean direction [length], and by
+    how much a unit of each component of the motion of each body changes this (bodies, dim).
+    """
+
+    value: float
+    weights: np.ndarray
+
+
+def approach(reduction: Reduction, solution: Solution) -> float | None:
+    """How far the plates bring the bodies together along the mean normal [length].
+
+    None without a plate, and where the surface surrounds a body, so that its normals have no mean.
+    """
+    if not any(_has_plate(part) for part in reduction.scene.parts):
+        return None
+    found = motion(reduction, reduction.displaced(solution), 0)
+    return None if found is None else 0.0 - found.value
+
+
+def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Motion | None:
+    """The motion along the mean normal (component 0) or the mean t1 (1), from the displacements U
+    (n,) of the bodies. Around a body these have no mean: there is no motion along the normal, None,
+    and that along t1 is zero in the mean.
+
+    Bodies with plates count, of those above and those below the contacts the means. Without any
+    plate all bodies count.
+    """
+    weights = _weights(reduction, component)
+    if weights is None:
+        return None
+    moved = np.zeros(weights.shape)
+    for body, U, own, out in zip(reduction.bodies, displaced, weights, moved):
+        for c in np.flatnonzero(own):
+            out[c] = float(body.carried(int(c))[0] @ U)
+    value, size = float(np.sum(weights * moved)), float(np.abs(weights * moved).sum())
+    extent = float(np.ptp(reduction.problem.coordinates, axis=1).max(initial=0.0))
+    rounding = max(ROUNDED * size, TINY * extent)
+    return Motion(value if abs(value) > rounding else 0.0, weights)
+
+
+def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
+    scene, problem = reduction.scene, reduction.problem
+    names = [part.name for part in scene.parts]
+    plates = np.array([_has_plate(part) for part in scene.parts])
+    counts = plates if plates.any() else np.ones(len(names), dtype=bool)
+    made, frames = np.zeros((len(names), problem.dim)), reduction.frames[:, component]
+    for side, sign in enumerate((1.0, -1.0)):
+        owner = np.concatenate(
+            [
+                np.full(own.stop - own.start, names.index(pair.bodies[side]))
+                for pair, own in zip(scene.pairs, problem.pairs)
+            ]
+        )
+        areas = problem.areas * counts[owner]
+        if not np.any(areas > 0):
+            continue
+        mean = _along_symmetry(reduction, areas @ frames / areas.sum(), component)
+        length = float(np.linalg.norm(mean))
+        if length < CLOSED:
+            return None if component == 0 else 0 * made
+        shares = np.bincount(owner, areas, len(names)) / areas.sum()
+        made += sign * shares[:, None] * mean / length
+    return made
+
+
+def _along_symmetry(reduction: Reduction, mean: np.ndarray, component: int) -> np.ndarray:
+    """The mean direction of the whole surface from that of the part of it that is modelled."""
+    if reduction.scene.kind == "axisymmetric":
+        return mean * [0.0, 1.0]
+    for plane in reduction.planes:
+        across = plane.inward * (plane.inward @ mean)
+        if component == 0:
+            mean = mean - across
+        elif len(mean) == 2:  # the image of the tangent goes on along the surface
+            mean = across
+    return mean
+
+
+def _has_plate(part: Any) -> bool:
+    """Whether a total force moves a part."""
+    loads = getattr(part, "loads", ())
+    return any(isinstance(load, Plate) for load in loads) or bool(getattr(part, "force", None))

@@ -1,0 +1,123 @@
+"""Input that can be solved and is probably not what is meant: units that do not fit each other,
+bodies that are misplaced, loads on a surface that may touch. `check` and `run` say the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from contactopt.coupling.coupling import Coupling
+from contactopt.scenes.material_library import STRESSES
+from contactopt.scenes.scene import Part, Plate, Scene, Traction
+
+# of the extent of a surface, up to which a closed gap is small, however fine its facets are
+SHARE = 0.02
+STIFFEST, SOFTEST = 1.3e12, 1e2  # Young's moduli [Pa]: above that of diamond, below that of gels
+FAINT = 1e-9  # stress of a load over Young's modulus: no load on a solid strains it less
+STIFFER = 3e5  # ratio of Young's moduli: that of steel to soft rubber is 1e5
+LARGER = 300.0  # ratio of sizes: metres beside millimetres, of bodies up to three times as large
+
+
+def doubts(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
+    """One sentence for everything about a scene that is probably not as it is meant."""
+    meshed = [part for part in scene.meshed.values() if part.given]
+    found = [note for part in meshed for note in _loaded_contacts(scene, part)]
+    found += [note for part in meshed for note in _faint_loads(scene, part)]
+    return [*found, *_stiffness(scene), *_sizes(meshed), *_gaps(scene, couplings)]
+
+
+def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
+    """Loads on facets that may touch."""
+    notes = []
+    for load in part.loads:
+        if isinstance(load, Traction) and np.any(load.value):
+            what = "traction"
+        elif isinstance(load, Plate) and any(load.force.values()):
+            what = "plate"
+        else:
+            continue
+        loaded = np.asarray(part.mesh.boundaries[load.boundary])
+        for name in scene.surfaces_of(part):
+            shared = len(np.intersect1d(loaded, part.mesh.boundaries[name]))
+            if shared:
+                notes.append(
+                    f"the {what} on {load.boundary!r} of body '{part.name}' acts on {shared}"
+                    f" facets of {name!r}, which may touch: it acts beside the contact forces, and"
+                    " where the surfaces are open; is another boundary meant?"
+                )
+    return notes
+
+
+def _faint_loads(scene: Scene, part: Part) -> list[str]:
+    """Loads that strain a body by next to nothing."""
+    stresses = [np.abs(load.value).max() for load in part.loads if isinstance(load, Traction)]
+    area = float(np.linalg.norm(np.ptp(part.mesh.p, axis=1))) ** (scene.dim - 1)
+    depth = scene.thickness if scene.kind == "plane-strain" else 1.0
+    for load in part.loads:
+        if isinstance(load, Plate):
+            force = max((abs(value) for value in load.force.values()), default=0.0)
+            stresses.append(force / (area * depth * scene.copies))
+    strain = max(stresses, default=0.0) / part.material.E
+    if not 0 < strain < FAINT:
+        return []
+    return [
+        f"the loads strain body '{part.name}' by about {strain:.0e} only: are its loads and"
+        f" E = {part.material.E:.3g} in the same unit, as N and MPa with lengths in mm?"
+    ]
+
+
+def _stiffness(scene: Scene) -> list[str]:
+    """Young's moduli that no solid has, or that are far from each other."""
+    elastic: list[Any] = [part for part in scene.parts if part.elastic]
+    notes, unit = [], scene.units[1]
+    for part in elastic if unit in STRESSES else ():
+        E = part.material.E * STRESSES[unit]
+        if not SOFTEST < E < STIFFEST:
+            like = "stiffer than diamond" if E >= STIFFEST else "softer than any solid"
+            notes.append(
+                f"body '{part.name}' has E = {part.material.E:.3g} {unit}, {like}: is it in {unit}?"
+            )
+    for one, other in combinations(elastic, 2):
+        soft, stiff = sorted((one, other), key=lambda part: part.material.E)
+        ratio = stiff.material.E / soft.material.E
+        if ratio > STIFFER:
+            notes.append(
+                f"body '{stiff.name}' is {ratio:.1e} times as stiff as '{soft.name}': are both E in"
+                " the same unit? A body that does not deform can be a rigid one."
+            )
+    return notes
+
+
+def _sizes(meshed: Sequence[Part]) -> list[str]:
+    """Bodies of which one vanishes beside the other."""
+    notes = []
+    size = {part.name: float(np.linalg.norm(np.ptp(part.mesh.p, axis=1))) for part in meshed}
+    for names in combinations(size, 2):
+        small, large = sorted(names, key=lambda name: size[name])
+        ratio = size[large] / size[small]
+        if ratio > LARGER:
+            notes.append(
+                f"body '{large}' is {ratio:.0f} times as large as '{small}': are both meshes in the"
+                " unit of length of the scene?"
+            )
+    return notes
+
+
+def _gaps(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
+    """Surfaces that overlap much or are far apart."""
+    notes, length = [], scene.units[0]
+    for pair, own in zip(scene.pairs, couplings):
+        size = float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
+        least = float(own.gap.min())
+        how = f"overlap by up to {-least:.4g} {length}"
+        how = how if least < 0 else f"are {least:.4g} {length} or more apart"
+        if abs(least) > SHARE * size:
+            notes.append(
+                f"the surfaces of '{pair.name}' {how}, more than {SHARE:.0%} of their extent: is a"
+                " body misplaced, or a unit of length wrong?"
+            )
+    return notes

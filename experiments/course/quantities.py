@@ -1,0 +1,248 @@
+"""Answers that are numbers, and what is told about wrong ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from experiments.course.mistakes import (
+    EXACT,
+    FACTORS,
+    quantity,
+    two_mistakes,
+    value,
+    wrong_values,
+)
+from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, wrong
+
+UNITS = (1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)
+# factors that no formula shows
+LOST = (
+    (2.0, "A factor of two is missing, or one too many."),
+    (0.5, "A factor of two is missing, or one too many."),
+    (np.pi, "A factor of pi is missing, or one too many."),
+    (1 / np.pi, "A factor of pi is missing, or one too many."),
+    (2 * np.pi, "A factor of 2 pi is missing, or one too many."),
+    (0.5 / np.pi, "A factor of 2 pi is missing, or one too many."),
+    (4.0, "A factor of four is missing, or one too many: look at squares and halves."),
+    (0.25, "A factor of four is missing, or one too many: look at squares and halves."),
+    (10.0, "The decimal point is in a wrong place."),
+    (0.1, "The decimal point is in a wrong place."),
+    (100.0, "Your answer is in percent, or the decimal point is in a wrong place."),
+    (0.01, "The decimal point is in a wrong place."),
+    (180 / np.pi, "Radians and degrees are mixed up."),
+    (np.pi / 180, "Radians and degrees are mixed up."),
+)
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """The answer agrees with numbers to a relative error, or is rounded to three digits; integers
+    are exact.
+
+    formulas  of the numbers, from which mistakes are made; given are the quantities in them
+    least, most  what mechanics allows: pairs of a number and the sentence that says why
+    """
+
+    value: Any
+    close: float = CLOSE
+    formulas: tuple[str, ...] = ()
+    given: dict[str, float] = field(default_factory=dict)
+    least: tuple[float, str] | None = None
+    most: tuple[float, str] | None = None
+
+    @property
+    def shapes(self) -> list[tuple[int, ...]]:
+        return [np.shape(self.value)]
+
+    @property
+    def counts(self) -> bool:
+        return np.asarray(self.value).dtype.kind == "i"
+
+    def agrees(self, answer: Any, value: Any) -> bool:
+        """Whether two answers are the same to the accuracy that is asked for."""
+        a, b = np.asarray(answer, dtype=float), np.asarray(value, dtype=float)
+        if a.shape != b.shape or self.counts:
+            return np.array_equal(a, b)
+        least = 0.1 * self.close * float(np.abs(b).max(initial=0.0))
+        three = np.array([rounded(x, 3) for x in b.ravel()]).reshape(b.shape)
+        same = np.isclose(a, b, rtol=self.close, atol=least) | np.isclose(a, three, rtol=1e-12)
+        return bool(same.all())
+
+    def resembles(self, answer: Any, value: Any) -> bool:
+        """Whether an answer is this wrong value, perhaps rounded to two digits."""
+        a, b = np.asarray(answer, dtype=float), np.asarray(value, dtype=float)
+        if a.shape != b.shape:
+            return False
+        pairs = zip(a.ravel(), b.ravel(), strict=True)
+        return self.agrees(a, b) or all(_same_digits(x, y, self.close) for x, y in pairs)
+
+    def verdict(self, answer: np.ndarray, listed: Sequence[tuple[Any, str]] = ()) -> Verdict:
+        """What is told; `listed` are wrong answers of this exercise with their sentences."""
+        value = np.asarray(self.value, dtype=float)
+        if self.agrees(answer, value):
+            return RIGHT
+        if not self.counts and self._rounded(answer, value):
+            return DIGITS
+        for other, told in listed:
+            if " " in told and self.resembles(answer, other):
+                return wrong("mistake", told)
+        if value.size == 1:
+            return self._one(float(answer.ravel()[0]), 0) or self._size(answer, value)
+        return self._several(answer, value)
+
+    def _rounded(self, answer: np.ndarray, value: np.ndarray) -> bool:
+        """Whether all digits that are given are right, but too few."""
+        pairs = zip(answer.ravel(), value.ravel(), strict=True)
+        return all(
+            abs(a - b) <= 1e-3 * self.close
+            or any(np.isclose(a, rounded(b, n), rtol=1e-9) for n in (2, 3))
+            or (np.isclose(a, rounded(b, 1), rtol=1e-9) and np.isclose(a, b, rtol=0.05))
+            or abs(a - b) <= 0.1 * self.close * abs(value).max()
+            for a, b in pairs
+        )
+
+    def _one(self, answer: float, i: int) -> Verdict | None:
+        """What is wrong with number i, if it is a typical mistake."""
+        right = float(np.ravel(self.value)[i])
+        if self.counts and answer != round(answer):
+            return wrong("count", "A count is a whole number.")
+        if self.agrees_alone(-answer, right):
+            return wrong("sign", "The size is right, the sign is not. Look at the arrows again.")
+        for factor in UNITS:
+            if self.agrees_alone(factor * answer, right):
+                told = f"Your answer is {1 / factor:g} times the right one. Look at the units."
+                return wrong("unit", told)
+        if self.counts and abs(answer - right) == 1:
+            return wrong("count", "It is one too many or one too few. Look at the ends again.")
+        for factor, told in LOST[:2]:
+            if self.agrees_alone(answer * factor, right):
+                return wrong("half", told)
+        found = self._from_formula(answer, i)
+        if found:
+            return found
+        for factor, told in LOST[2:]:
+            if self.agrees_alone(answer * factor, right):
+                return wrong("factor", told)
+        if right and self.agrees_alone(answer * right, 1.0):
+            return wrong("inverse", "This is one over the right answer.")
+        for power, told in ((2.0, "A square root is missing."), (0.5, "A square is missing.")):
+            if right > 0 and self.agrees_alone(answer, right**power):
+                return wrong("power", f"{told} Look at the exponents.")
+        for bound, side in ((self.least, -1), (self.most, 1)):
+            if bound and side * (answer - bound[0]) > 0:
+                return wrong("bound", bound[1])
+        return self._two_mistakes(answer, i) or self._other_quantity(answer, i)
+
+    def _from_formula(self, answer: float, i: int) -> Verdict | None:
+        if i >= len(self.formulas):
+            return None
+        mistakes = wrong_values(self.formulas[i], self.given)
+        mistakes.sort(key=lambda one: "takes the place" in one[1])
+        for number, told in mistakes:
+            if _same_digits(answer, number, self.close):
+                return wrong("formula", told)
+        return None
+
+    def _two_mistakes(self, answer: float, i: int) -> Verdict | None:
+        """A mistake in the formula, and a sign, a factor of two or a unit besides."""
+        mistakes = wrong_values(self.formulas[i], self.given) if i < len(self.formulas) else []
+        for factor, besides in FACTORS:
+            for number, told in mistakes:
+                if np.isclose(answer, factor * number, rtol=self.close, atol=0) and number:
+                    return wrong("formula", f"{told} {besides}")
+        return None
+
+    def _other_quantity(self, answer: float, i: int) -> Verdict | None:
+        """Whether an answer is another number of the exercise, or made of its numbers."""
+        right = np.ravel(np.asarray(self.value, dtype=float))
+        if answer == 0:
+            return wrong("zero", "Zero would mean that nothing acts here. Look at the loads again.")
+        for j in range(right.size):
+            if j != i and self.agrees_alone(answer, right[j]):
+                return wrong("place", f"This is the right number {j + 1}: it belongs there only.")
+        if 0 < right[i] < 1 and np.isclose(answer, 1 - right[i], rtol=self.close):
+            return wrong("rest", "This is the rest: one minus the right answer.")
+        name = quantity(answer, self.given, self.close)
+        if name:
+            return wrong("combination", f"This is `{name}`: that is another quantity.")
+        formula = self.formulas[i] if i < len(self.formulas) else "0"
+        for number, told in two_mistakes(formula, tuple(self.given.items())):
+            if abs(answer - number) <= EXACT * abs(number):
+                return wrong("formula", told)
+        return None
+
+    def agrees_alone(self, answer: float, right: float) -> bool:
+        """Whether one number is right by itself."""
+        if self.counts:
+            return answer == right
+        return bool(np.isclose(answer, right, rtol=self.close, atol=0)) or answer == rounded(
+            right, 3
+        )
+
+    def _several(self, answer: np.ndarray, value: np.ndarray) -> Verdict:
+        if value.size <= 5 and any(self.resembles(p, value) for p in permutations(answer)):
+            return wrong("order", "These are the right numbers in a wrong order.")
+        if self.agrees(-answer, value):
+            return wrong(
+                "sign", "The sizes are right, the signs are not. Look at the arrows again."
+            )
+        for factor in (*UNITS, 0.5, 2.0):
+            if self.agrees(factor * answer, value):
+                if factor in (0.5, 2.0):
+                    return wrong("half", LOST[0][1])
+                told = f"Your answer is {1 / factor:g} times the right one. Look at the units."
+                return wrong("unit", told)
+        pairs = list(zip(answer.ravel(), value.ravel(), strict=True))
+        good = [i + 1 for i, (a, b) in enumerate(pairs) if self._good(a, b, value)]
+        head = f"Of your {value.size} numbers these are right: {good}. " if good else ""
+        for i, (a, b) in enumerate(pairs):
+            if not self._good(a, b, value):
+                found = self._one(float(a), i)
+                if found:
+                    told = found.sentence.removeprefix("not right yet. ")
+                    return wrong("part", f"{head}Number {i + 1}: {told}")
+        if good:
+            return wrong("part", head.strip())
+        return self._size(answer, value)
+
+    def _good(self, a: float, b: float, value: np.ndarray) -> bool:
+        least = 0.1 * self.close * abs(value).max()
+        return self.agrees_alone(a, b) or (not self.counts and abs(a - b) <= least)
+
+    def _size(self, answer: np.ndarray, value: np.ndarray) -> Verdict:
+        """The last word: in which direction the answer is off."""
+        a, b = float(abs(answer).max()), float(abs(value).max())
+        if a > 2 * b or b > 2 * a:
+            told = "more than twice as large as it should be" if a > b else "less than half of it"
+            return wrong("size", f"Your answer is {told}.")
+        if np.allclose(answer, value, rtol=0.03, atol=0.03 * b):
+            return wrong(
+                "near", "You are within 3 percent: a small term is missing, or some digits."
+            )
+        return wrong("size", "The size is plausible, but the value is not right.")
+
+
+def by_hand(
+    formulas: Sequence[str],
+    given: dict[str, float],
+    close: float = CLOSE,
+    least: tuple[float, str] | None = None,
+    most: tuple[float, str] | None = None,
+) -> Numbers:
+    """Numbers that have formulas; formulas that begin with ceil give integers."""
+    found = [value(formula, given) for formula in formulas]
+    numbers: Any = [int(x) for x in found] if formulas[0].startswith("ceil") else found
+    whole = numbers[0] if len(numbers) == 1 else tuple(numbers)
+    return Numbers(whole, close, tuple(formulas), given, least, most)
+
+
+def _same_digits(answer: float, value: float, close: float) -> bool:
+    """Whether an answer is this number, perhaps rounded to two or three digits."""
+    if np.isclose(answer, value, rtol=close, atol=0):
+        return True
+    return any(np.isclose(answer, rounded(value, n), rtol=1e-9, atol=0) for n in (2, 3))

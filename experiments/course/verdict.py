@@ -1,0 +1,30 @@
+"""What is told about an answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+CLOSE = 1e-3  # relative error of numbers, and certificate of forces, that still counts as right
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether an answer is right, the kind of its error, what to tell, and the worst contact."""
+
+    right: bool
+    kind: str
+    sentence: str
+    contact: int | None = None
+
+
+RIGHT = Verdict(True, "right", "right.")
+DIGITS = Verdict(False, "digits", "nearly right: the first digits are. Give three digits.")
+
+
+def wrong(kind: str, sentence: str, contact: int | None = None) -> Verdict:
+    return Verdict(False, kind, f"not right yet. {sentence}", contact)
+
+
+def rounded(x: float, digits: int) -> float:
+    """x with so many digits."""
+    return float(f"{x:.{digits}g}")

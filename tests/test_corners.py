@@ -1,0 +1,315 @@
+"""Contact boundaries around corners: each side has its normals and areas, and curves stay whole."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+import skfem
+from mortar_scenes import ring
+from turned import mirror, moved, turn
+
+from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce, run, solve
+from contactopt.bodies.corners import copies
+from contactopt.bodies.elements import make_basis
+from contactopt.meshes.given_curves import Curve
+
+E, NU = 1e4, 0.3
+STRESS = {2: np.array([-0.6, -1.0]), 3: np.array([-0.6, -0.3, -1.0])}
+KINDS = {
+    ("quad", 2): skfem.MeshQuad,
+    ("tri", 2): skfem.MeshTri,
+    ("quad", 3): skfem.MeshHex,
+    ("tri", 3): skfem.MeshTet,
+}
+
+
+def box(low: float, high: float, cells: int, kind: str, dim: int):
+    """A square or cube with the boundaries low0, high0, ... and `rest` of all low ones."""
+    mesh = KINDS[kind, dim].init_tensor(*[np.linspace(low, high, cells + 1)] * dim)
+    return with_sides(mesh, low, high)
+
+
+def with_sides(mesh, low: float, high: float):
+    near = 1e-9
+    sides = {}
+    for axis in range(len(mesh.p)):
+        sides[f"low{axis}"] = partial(lambda x, a: abs(x[a] - low) < near, a=axis)
+        sides[f"high{axis}"] = partial(lambda x, a: abs(x[a] - high) < near, a=axis)
+        sides[f"seat{axis}"] = partial(
+            lambda x, a: (abs(x[a]) < near) & (np.delete(x, a, axis=0).min(axis=0) > 0), a=axis
+        )
+    sides["seat"] = lambda x: (np.abs(x).min(axis=0) < near) & (x.min(axis=0) > -near)
+    return mesh.with_boundaries(sides)
+
+
+def seat(cells: int, kind: str, dim: int):
+    """A box from -1 to 1 without its part of all positive coordinates."""
+    mesh = KINDS[kind, dim].init_tensor(*[np.linspace(-1, 1, 2 * cells + 1)] * dim)
+    middle = mesh.p[:, mesh.t].mean(axis=1)
+    mesh = mesh.restrict(np.flatnonzero(~np.all(middle > 0, axis=0)))
+    return with_sides(type(mesh)(mesh.p, mesh.t), -1.0, 1.0)
+
+
+def seated(cells, kinds, dim, degree, contacts, upper_first=True) -> Scene:
+    """A block in a seat, both pressed along the axes, so that the stress is STRESS everywhere."""
+    axes = "xyz"[:dim]
+    loads = [
+        Traction(f"high{i}", tuple(STRESS[dim][i] * (j == i) for j in range(dim)))
+        for i in range(dim)
+    ]
+    supports = tuple(Support(f"low{i}", {name: 0.0}) for i, name in enumerate(axes))
+    material = Material(E, NU)
+    lower = seat(cells[0], kinds[0], dim)
+    upper = box(0.0, 1.0, cells[1], kinds[1], dim)
+    lower = Part("seat", lower, material, supports, tuple(loads), contact="seat")
+    upper = Part("block", upper, material, (), tuple(loads), contact="seat")
+    kind = "solid" if dim == 3 else "plane-strain"
+    return Scene("seated", bodies=(lower, upper), contacts=contacts, degree=degree, kind=kind)
+
+
+def strain(dim: int) -> np.ndarray:
+    s = STRESS[dim]
+    total = s.sum() + (NU * s.sum() if dim == 2 else 0.0)  # with the stress out of the plane
+    return ((1 + NU) * s - NU * total) / E
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("names", [("block", "seat"), ("seat", "block")])
+@pytest.mark.parametrize(
+    ("cells", "kinds"),
+    [((4, 4), ("quad", "quad")), ((4, 7), ("quad", "tri")), ((1, 1), ("tri",) * 2)],
+)
+def test_a_block_in_a_seat_bears_its_uniform_stress(cells, kinds, names, degree):
+    scene = seated(cells, kinds, 2, degree, (Contact(*names, 0.0),))
+    result = run(scene, figures=())
+    exact = strain(2)[:, None]
+    for body in result.fields:
+        error = body.displacement - exact * (body.mesh.p + 1)
+        assert np.abs(error).max() < 1e-9 * np.abs(exact).max()
+    on = np.abs(result.problem.coordinates[0]) < 1e-9
+    normal = np.abs(result.reduction.frames[:, 0, 0])
+    assert np.all(on[normal > 0.5])
+    assert np.allclose(result.pressure, np.where(normal > 0.5, 0.6, 1.0), rtol=1e-8)
+    assert np.isclose(result.problem.areas.sum(), 2.0)
+    assert not any("constant pressure" in text for text in result.summary["remarks"])
+
+
+@pytest.mark.parametrize(
+    ("cells", "kinds", "degree"),
+    [((2, 2), ("quad", "quad"), 1), ((2, 3), ("quad", "tri"), 1), ((1, 2), ("quad", "quad"), 2)],
+)
+def test_three_faces_of_a_cube_are_three_sides(cells, kinds, degree):
+    scene = seated(cells, kinds, 3, degree, (Contact("block", "seat", 0.0, coupling="mortar"),))
+    result = run(scene, figures=())
+    exact = strain(3)[:, None]
+    for body in result.fields:
+        error = body.displacement - exact * (body.mesh.p + 1)
+        assert np.abs(error).max() < 1e-8 * np.abs(exact).max()
+    assert not any("constant pressure" in text for text in result.summary["remarks"])
+    axis = np.argmax(np.abs(result.reduction.frames[:, 0]), axis=1)
+    assert np.allclose(result.pressure, -STRESS[3][axis], rtol=1e-7)
+    assert np.isclose(result.problem.areas.sum(), 3.0)
+
+
+@pytest.mark.parametrize("angle", [20.0, 60.0, 90.0, 125.0])
+@pytest.mark.parametrize("cells", [(3, 3), (3, 4)])
+@pytest.mark.parametrize("names", [("block", "seat"), ("seat", "block")])
+def test_one_boundary_around_a_corner_is_two_pairs(angle, cells, names):
+    """Loads that are not uniform, at any angle between the sides, convex and concave."""
+    pairs = [
+        tuple(f"{body}:seat{i}" for body in names) for i in (0, 1)
+    ]  # the boundary `seat` by its sides
+    both = []
+    a = np.deg2rad(angle)
+    shear = np.array([[1.0, np.cos(a)], [0.0, np.sin(a)]])
+    for contacts in ((Contact(*names, 0.0),), tuple(Contact(*pair, 0.0) for pair in pairs)):
+        scene = seated(cells, ("tri", "quad"), 2, 1, contacts)
+        loads = (Traction("high0", (-1.0, -0.3)), Traction("high1", (-0.2, -0.7)))
+
+        def changed(part, loads=loads):
+            mesh = replace(part.mesh, doflocs=shear @ part.mesh.p)
+            held = tuple(Support(s.boundary) for s in part.supports)
+            return replace(part, mesh=mesh, supports=held, loads=loads)
+
+        both.append(run(scene.with_parts(changed), figures=()))
+    for one, two in zip(both[0].fields, both[1].fields):
+        assert np.abs(one.displacement).max() > 1e-6
+        assert np.allclose(one.displacement, two.displacement, rtol=0, atol=1e-11)
+    assert np.allclose(np.sort(both[0].pressure), np.sort(both[1].pressure), atol=1e-7)
+
+
+@pytest.mark.parametrize("change", [turn(33.0), turn(90.0), mirror(2), 1e-3 * np.eye(2)])
+def test_the_answer_does_not_depend_on_the_axes_and_units(change):
+    made = seated((3, 4), ("quad", "tri"), 2, 1, (Contact("block", "seat", 0.2),))
+    loads = (Traction("high0", (-1.0, -0.3)), Traction("high1", (-0.2, -0.7)))
+    lower, upper = (
+        replace(part, supports=tuple(Support(s.boundary) for s in part.supports), loads=loads)
+        for part in made.parts
+    )
+    size = np.sqrt(abs(np.linalg.det(change)))
+    smaller = tuple(replace(load, value=tuple(np.array(load.value) / size)) for load in loads)
+    here = run(Scene("seated", upper, lower, mu=0.2), figures=())
+    upper, lower = (replace(part, loads=smaller) for part in (upper, lower))
+    there = run(moved(Scene("seated", upper, lower, mu=0.2), change), figures=())
+    assert np.allclose(np.sort(here.pressure), np.sort(there.pressure), atol=1e-7)
+
+
+def walled(outline: np.ndarray, kind: str, dim: int, layers: int = 2):
+    """A wall between an outline (2, n), around the origin, and the same at half its size; in space
+    drawn out along z. Boundaries `outer` and `inner`.
+    """
+    grids = [np.array([0.0, 1.0]), np.arange(outline.shape[1]), np.linspace(0, 1, layers + 1)]
+    mesh = KINDS["quad", dim].init_tensor(*grids[:dim])
+    if kind == "tri":
+        mesh = mesh.to_meshtri() if dim == 2 else mesh.to_meshtet()
+    on = {
+        name: mesh.facets_satisfying(partial(lambda x, at: abs(x[0] - at) < 1e-9, at=at), True)
+        for name, at in (("inner", 0.0), ("outer", 1.0))
+    }
+    p = mesh.p.copy()
+    p[:2] = (1 + mesh.p[0]) / 2 * outline[:, np.rint(mesh.p[1]).astype(int)]
+    return type(mesh)(p, mesh.t).with_boundaries(on)
+
+
+def sides(mesh, name: str = "outer", degree: int = 1, curve=None) -> int:
+    """The number of copies of nodes at corners."""
+    basis = make_basis(mesh, degree, False)
+    known = copies(basis, degree, mesh.boundaries[name], mesh, curve)[1]
+    return len(known) - len(np.unique(known))
+
+
+def circle(start: float, end: float, chords: int) -> np.ndarray:
+    a = np.deg2rad(np.linspace(start, end, chords + 1))
+    return np.array([np.cos(a), np.sin(a)])
+
+
+def bent(angle: float, chords: int = 2, shift: float = 1.0) -> np.ndarray:
+    """Two straight lines that turn by an angle [degrees] above the origin."""
+    a = np.deg2rad(angle / 2)
+    s = np.linspace(1.0, 0.0, chords + 1)
+    left = np.array([s * np.cos(a), shift - s * np.sin(a)])
+    return np.concatenate([left, left[:, -2::-1] * [[-1], [1]]], axis=1)
+
+
+ROUND = {
+    "a quarter by 3 chords": circle(0, 90, 3),
+    "a half by 4 chords": circle(0, 180, 4),
+    "a third by chords of uneven length": np.concatenate(
+        [circle(0, 60, 3), circle(80, 120, 1)], axis=1
+    ),
+    "an ellipse of 1 to 3": circle(-90, 90, 16) * [[3.0], [1.0]],
+    "a fillet of 90 degrees by 2 chords": np.concatenate(
+        [[[2.0, 2.0], [0.0, 0.5]], circle(0, 90, 2) + 1, [[0.5, 0.0], [2.0, 2.0]]], axis=1
+    ),
+    "a fillet of 60 degrees by 4 chords": np.concatenate(
+        [[[2.0], [0.5]], circle(0, 60, 4) + 1], axis=1
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", ["quad", "tri"])
+@pytest.mark.parametrize("name", ["outer", "inner"])
+@pytest.mark.parametrize("case", ROUND)
+@pytest.mark.parametrize("dim", [2, 3])
+def test_curves_that_are_meshed_coarsely_stay_whole(dim, case, name, kind):
+    for degree in (1, 2):
+        assert sides(walled(ROUND[case], kind, dim), name, degree) == 0
+
+
+@pytest.mark.parametrize("chords", [6, 8, 12])
+def test_closed_polygons_for_circles_stay_whole(chords):
+    assert sides(ring(0.5, 1.0, 1, chords, 2 * np.pi)) == 0
+    assert sides(ring(0.5, 1.0, 1, chords, 2 * np.pi), "inner") == 0
+
+
+@pytest.mark.parametrize("cells", [1, 2, 4])
+def test_curved_elements_have_no_corners_where_they_meet(cells):
+    mesh = ring(0.5, 1.0, 1, cells, np.pi / 2, curved=True)
+    assert sides(mesh, "outer", 2) == sides(mesh, "outer", 1) == 0
+
+
+def test_a_ball_of_few_triangles_has_no_edges():
+    mesh = skfem.MeshTet.init_ball(1)
+    assert sides(mesh.with_boundaries({"outer": lambda x: np.full(x.shape[1], True)})) == 0
+
+
+@pytest.mark.parametrize("angle", [8.0, 30.0, 60.0, 90.0, 140.0])
+@pytest.mark.parametrize("name", ["outer", "inner"])
+@pytest.mark.parametrize("kind", ["quad", "tri"])
+def test_corners_have_two_sides_at_any_angle(angle, name, kind):
+    shift = 1.0 if angle < 100 else 2.0
+    for degree in (1, 2):
+        assert sides(walled(bent(angle, shift=shift), kind, 2), name, degree) == 1
+        # an edge of two elements, with nodes between them at degree 2
+        count = sides(walled(bent(angle, shift=shift), kind, 3), name, degree)
+        assert count == (3 if degree == 1 else 5)
+
+
+def test_corners_beside_curves_and_chamfers():
+    arcs = np.concatenate([circle(0, 60, 4), [[-1.0, -1.75], [0.6, 0.467]]], axis=1)
+    assert sides(walled(arcs, "quad", 2)) == 1
+    chamfer = np.array([[2.0, 2, 2, 1.5, 1, 0], [0.0, 0.5, 1, 1.5, 1.5, 1.5]])
+    assert sides(walled(chamfer, "quad", 2)) == 2
+    tooth = np.array([[3.0, 2.5, 2, 1.5, 1, 0.5, 0], [1.3, 1.8, 1.3, 1.8, 1.3, 1.8, 1.3]])
+    assert sides(walled(tooth, "quad", 2)) == 5
+
+
+def test_cubes_have_edges_and_corners_however_coarse():
+    for cells, kind in ((1, "quad"), (1, "tri"), (3, "tri")):
+        mesh = box(0.0, 1.0, cells, kind, 3)
+        corners = 3 - 1 + 3 * cells  # three sides at the corner, two along three edges
+        assert sides(mesh, "seat") == corners
+    assert sides(box(0.0, 1.0, 1, "quad", 2), "seat") == 1
+
+
+def test_a_given_curve_says_where_corners_are():
+    mesh = walled(circle(0, 90, 1 + 1), "quad", 2)
+    coarse = walled(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]]), "quad", 2)
+    smooth = Curve(lambda x: x / np.hypot(*x), True)
+    sharp = Curve(lambda x: x / np.abs(x).max(axis=0), True)
+    assert sides(mesh, curve=smooth) == 0
+    assert sides(coarse) == sides(coarse, curve=sharp) == 1
+    assert sides(coarse, curve=smooth) == 0  # two chords of a circle, far off it
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_side_wall_bears_nothing_on_a_floor(degree):
+    block = box(0.0, 1.0, 4, "quad", 2)
+    load = Traction("high1", (0.0, -1.0))
+    part = Part(
+        "block", block, Material(E, NU), (Support("low0", {"x": 0.0}),), (load,), contact="seat"
+    )
+    floor = Rigid("floor", normal=(0.0, 1.0), gap=lambda x: x[1])
+    problem = reduce(Scene("s", part, floor, mu=0.0, degree=degree))
+    pressure = solve(problem).reactions[:, 0] / problem.areas
+    below = problem.coordinates[1] < 1e-9
+    assert below.sum() == (5 if degree == 1 else 9)
+    assert np.allclose(pressure[below], 1.0, rtol=1e-7)
+
+
+@pytest.mark.parametrize("names", [("tip", "floor"), ("floor", "tip")])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_tip_on_an_elastic_floor_has_one_contact_for_each_normal(degree, names):
+    outline = bent(60.0, 3)
+    tip = walled(outline, "quad", 2)
+    tip = replace(tip, doflocs=tip.p * [[1.0], [-1.0]] + [[0.0], [1.0]])
+    floor = box(-1.0, 1.0, 5, "quad", 2)
+    floor = replace(floor, doflocs=floor.p - [[0.0], [1.0]])
+    material = Material(E, NU)
+    load, guide = Traction("inner", (0.0, -1.0)), Support("inner", {"x": 0.0})
+    parts = (
+        Part("tip", tip, material, (guide,), (load,), contact="outer"),
+        Part("floor", floor, material, (Support("low1"),), contact="high1"),
+    )
+    result = run(Scene("tip", bodies=parts, contacts=(Contact(*names, 0.0),), degree=degree))
+    assert result.solution.solved
+    at = np.linalg.norm(result.problem.coordinates, axis=0) < 1e-9
+    assert at.sum() == (1 if names[1] == "floor" else 2)
+
+
+def test_the_peak_of_the_pressure_is_read_on_its_own_side():
+    scene = seated((4, 4), ("quad", "quad"), 2, 1, (Contact("block", "seat", 0.0),))
+    found = run(scene, figures=(), accuracy=0.01, quantity="pressure")
+    assert found.estimate.reached and found.estimate.value == pytest.approx(1.0, abs=1e-8)
+    assert not any("largest pressure" in text for text in found.summary["remarks"])

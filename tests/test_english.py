@@ -1,0 +1,77 @@
+"""Idioms that were translated from another language, and that the field does not use. They stood on
+pages, in docstrings and in messages; this list keeps them from coming back. CONTRIBUTING.md says
+what to write instead.
+"""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+CALQUES = (
+    r"\blets? (?:one |us |you )?expect\b",
+    r"\b(?:is|are) told (?:before|beforehand)\b",
+    r"\b(?:solver|code|peer|method)s? of others\b",
+    r"\bstraight between (?:two|them|these)\b",
+    r"\bdrawn anew\b",
+    r"\bprograms? of others\b",
+    r"\bask it before\b",
+    r"\bwhat it spoils\b",
+    r"\btimes the least of\b",
+    r"\bof a load path (?:it|this|the deck) (?:is|has)\b",
+    r"\bfrom here on (?:it|the|some)\b",
+    r"\b(?:PDF|picture) is what your\b",
+    r"\btest that holds (?:it|this)\b",
+    r"\bno usable answer\b",
+    r"\bcorresponding form of\b",
+    r"\bdirections are nearly parallel\b",
+    r"\basked for a certificate of\b",
+    r"\bcomes? near it\b.{0,20}\bmesh\b",
+    r"\bsmaller than [\d.]+, but for\b",
+    r"\bnothing with a mesh\b",
+    r"\bis dear\b",
+    r"\btells? parameters\b",
+    r"\bwhat (?:it|that|one|each) is worth\b",
+    r"\bmakes? (?:it|this) to a\b",
+    r"\bso long until\b",
+    r"\bin the meaning of\b",
+    r"\bunder the condition that\b",
+    r"\bone speaks of\b",
+    r"\bthe one after the other\b",
+    r"\bis in the position to\b",
+    r"\bcomes into question\b",
+    r"\bto the contrary of\b",
+    r"\bstands? to choice\b",
+)
+FOLDERS = ("contactopt", "experiments/site", "experiments/course", "experiments/tutorials")
+KINDS = {".py", ".md", ".toml", ".js", ".html"}
+QUOTED = re.compile(r"^\| not \| but \|\n(?:\|.*\n)*", re.M)  # examples of CONTRIBUTING.md
+
+
+def texts():
+    for name in ("README.md", "CONTRIBUTING.md", "reports/README.md"):
+        yield ROOT / name
+    for folder in (*FOLDERS, "experiments/gallery"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.suffix in KINDS and "generated" not in path.parts:
+                yield path
+
+
+ANY = re.compile("|".join(CALQUES), re.I)
+
+
+def found(text):
+    text = re.sub(r"\n\s*(?:#\s+)?|\"\s*f?\"", " ", QUOTED.sub("", text))  # over ends of lines
+    return ANY.findall(text)
+
+
+def test_no_calque_has_come_back():
+    paths = list(texts())
+    assert len(paths) > 300
+    wrong = {str(path.relative_to(ROOT)): found(path.read_text()) for path in paths}
+    assert not any(wrong.values()), {name: words for name, words in wrong.items() if words}
+
+
+def test_the_list_finds_a_calque_over_the_end_of_a_line():
+    assert found("# the error that this one mesh lets\n# expect") == ["lets expect"]
+    assert found("a solver of\nothers") and not found("an external solver")
+    assert found("| not | but |\n|---|---|\n| lets expect | x |\n") == []

@@ -1,0 +1,166 @@
+"""A run that is killed after any of its steps leaves a file from which it can be resumed, with the
+same answer.
+"""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import contactopt
+from contactopt import Plate, Scene, runner
+from contactopt.files.writing import replace_file
+from contactopt.scenes import PATHS, SCENES, make_path, make_scene
+from contactopt.solving.restart import FILE, Restart, read_known
+
+SMALL = {
+    "a scene": ("punch-3d", {"elements": 4}),
+    "a contact zone": ("cylinder-2d", {"elements": 8}),
+    "several pairs": ("stack", {"elements": 2}),
+    "a path": ("hertz-dissimilar", {"steps": 3, "elements": 6}),
+    "a path of half-spaces": ("rough", {"steps": 2, "points": 40}),
+    "a simplified scene": ("press-fit", {"elements": 4, "simplest": True}),
+    "an accuracy": ("punch-2d", {"accuracy": 0.3, "quantity": "energy"}),
+    "an accuracy of divided meshes": (
+        "punch-2d",
+        {"elements": 4, "accuracy": 0.2, "quantity": "energy", "adaptive": True},
+    ),
+    "a path with an accuracy": (
+        "hertz-dissimilar",
+        {"steps": 2, "elements": 8, "accuracy": 0.3, "quantity": "energy"},
+    ),
+    "a path with an accuracy on divided meshes": (
+        "hertz-dissimilar",
+        {"steps": 2, "elements": 6, "accuracy": 0.5, "quantity": "energy", "adaptive": True},
+    ),
+}  # fmt: skip
+MOST = 3  # snapshots of a quick test from which a run is resumed
+
+
+def kept_at_each_step(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """Make runs write their file at every step, and keep a copy: what a kill would leave."""
+    copies: list[Path] = []
+
+    def keep(self: Restart) -> None:
+        if self.file is not None:
+            replace_file(self.file, self.save)
+            copies.append(folder / f"{len(copies)}.npz")
+            shutil.copy(self.file, copies[-1])
+
+    def reached(self: Restart, *point: np.ndarray) -> None:
+        self.now = point
+        keep(self)
+
+    finished = Restart.finished
+
+    def finish(self: Restart, *solution: object) -> None:
+        finished(self, *solution)
+        keep(self)
+
+    monkeypatch.setattr(Restart, "reached", reached)
+    monkeypatch.setattr(Restart, "finished", finish)
+    return copies
+
+
+def numbers(result: Any) -> np.ndarray:
+    """What a run answers: sums over all states, and the quantity that it was asked for."""
+    states = [result] if result.path is None else result.path.states
+    found = [float(np.abs(state.solution.reactions).sum()) for state in states]
+    return np.array([*found, *([result.estimate.value] if result.estimate else [])])
+
+
+@pytest.mark.parametrize("kind", SMALL)
+def test_a_run_goes_on_from_each_of_its_steps(kind, tmp_path, monkeypatch):
+    name, options = SMALL[kind]
+    options = options | {"figures": ()}
+    with monkeypatch.context() as patched:
+        copies = kept_at_each_step(tmp_path, patched)
+        whole = contactopt.run(name, tmp_path / "whole", **options)
+    known = read_known(tmp_path / "whole")
+    assert known.complete and known.reactions[-1].shape == whole.solution.reactions.shape
+    assert len(known.names) == len(whole.problem.pairs) and copies
+    chosen = np.unique(np.linspace(0, len(copies) - 1, MOST).astype(int))
+    for number in chosen:
+        out = tmp_path / f"resumed-{number}"
+        out.mkdir()
+        shutil.copy(copies[number], out / FILE)
+        again = contactopt.run(name, out, resume=True, **options)
+        assert again.solution.solved
+        np.testing.assert_allclose(numbers(again), numbers(whole), rtol=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind, step", [("a contact zone", 2), ("a path with an accuracy", 12)])
+def test_a_process_that_is_killed_leaves_a_run_that_goes_on(kind, step, tmp_path):
+    name, options = SMALL[kind]
+    options = options | {"figures": ()}
+    program = f"""
+import os, signal
+import contactopt
+from contactopt.solving.restart import Restart
+
+steps = 0
+def reached(self, *point):
+    global steps
+    self.now, steps = point, steps + 1
+    self.save(self.file)
+    if steps == {step}:
+        os.kill(os.getpid(), signal.SIGKILL)
+Restart.reached = reached
+contactopt.run({name!r}, {str(tmp_path)!r}, **{options!r})
+"""
+    ended = subprocess.run([sys.executable, "-c", program], env=os.environ, timeout=120)
+    assert ended.returncode == -signal.SIGKILL
+    again = contactopt.run(name, tmp_path, resume=True, **options)
+    np.testing.assert_allclose(numbers(again), numbers(contactopt.run(name, **options)), rtol=1e-3)
+
+
+def as_path(name: str) -> tuple[Scene, ...]:
+    """A named scene as a load path: its own, or half of its loads and all of them."""
+    size = {"elements": 4} if name != "rough" else {"points": 40}
+    if name in PATHS:
+        steps = {"hertz-dissimilar": 2, "rough": 2}.get(name, 1)
+        return make_path(name, steps=steps, **size)[:3]
+    scene = make_scene(name, **size)
+
+    def half(part: Any) -> Any:
+        if part.meshed:
+            return replace(part, loads=tuple(map(lighter, part.loads)))
+        force = part.force and {axis: value / 2 for axis, value in part.force.items()}
+        return replace(part, force=force)
+
+    def lighter(load: Any) -> Any:
+        if isinstance(load, Plate):
+            return replace(load, force={axis: value / 2 for axis, value in load.force.items()})
+        return replace(load, value=tuple(np.asarray(load.value) / 2))
+
+    return scene.with_parts(half), scene
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_every_named_scene_as_a_path_with_an_accuracy(name, adaptive, tmp_path, monkeypatch):
+    """Saved at each step, and resumed from the first, some middle and the last one."""
+    states = as_path(name)
+    if adaptive and any(part.elastic and not part.meshed for part in states[0].parts):
+        pytest.skip("a half-space has no elements to divide")
+    monkeypatch.setattr(runner, "_states", lambda *_: states)
+    options = {"figures": (), "accuracy": 0.5, "quantity": "energy", "adaptive": adaptive}
+    options["max_unknowns"] = 3000
+    with monkeypatch.context() as patched:
+        copies = kept_at_each_step(tmp_path, patched)
+        whole = contactopt.run(name, tmp_path / "whole", **options)
+    for number in {0, len(copies) // 2, len(copies) - 1}:
+        out = tmp_path / f"resumed-{number}"
+        out.mkdir()
+        shutil.copy(copies[number], out / FILE)
+        again = contactopt.run(name, out, resume=True, **options)
+        np.testing.assert_allclose(numbers(again), numbers(whole), rtol=1e-3, atol=1e-9)

@@ -1,0 +1,142 @@
+"""Every coupling is asked whether a constant pressure gives both sides their consistent forces."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import turned
+from mortar_scenes import press_fit
+
+from contactopt import Contact, Material, Part, Scene, Support, Traction, reduce_bodies, run
+from contactopt.coupling import coupling as seam
+from contactopt.coupling.patch_test import misfit
+from contactopt.figures.scene_check import check_scene
+from contactopt.meshes.structured import rename, simplices, tensor_mesh
+
+MATERIAL = Material(1e4, 0.3)
+
+
+def cube(low: float, shape: str, cells: int = 3):
+    """A unit cube of hexahedra, of tetrahedra, or of tetrahedra mirrored in the plane x = 1/2."""
+    grid = np.linspace(0.0, 1.0, cells + 1)
+    mesh = tensor_mesh(grid, grid, low + grid)
+    names = {"left": "x-", "front": "y-", "bottom": "z-", "top": "z+"}
+    if shape == "hexahedra":
+        return rename(mesh, **names)
+    mesh = simplices(rename(mesh, **names))
+    if shape == "mirrored":
+        p = mesh.p.copy()
+        p[0] = 1 - p[0]
+        middle = {name: p[:, mesh.facets[:, f]].mean(axis=1) for name, f in mesh.boundaries.items()}
+        del middle["left"]
+        mesh = type(mesh)(p, mesh.t)
+        ends = {"left": (0, 0.0), "front": (1, 0.0), "bottom": (2, low), "top": (2, low + 1)}
+        mesh = mesh.with_boundaries(
+            {name: (lambda x, a=a, v=v: np.abs(x[a] - v) < 1e-9) for name, (a, v) in ends.items()}
+        )
+    return mesh
+
+
+def cubes(shapes: tuple[str, str], degree: int = 1, **contact) -> Scene:
+    """A cube pressed on another one by a pressure of one; the exact stress is uniaxial."""
+    sides = Support("left", {"x": 0.0}), Support("front", {"y": 0.0})
+    upper = Part(
+        "upper", cube(1.0, shapes[0]), MATERIAL, sides, (Traction("top", (0, 0, -1.0)),), "bottom"
+    )
+    floor = (*sides, Support("bottom", {"z": 0.0}))
+    lower = Part("lower", cube(0.0, shapes[1]), MATERIAL, floor, contact="top")
+    pair = Contact("upper", "lower", **{"mu": 0.3} | contact)
+    return Scene("cubes", bodies=(upper, lower), contacts=(pair,), kind="solid", degree=degree)
+
+
+@pytest.mark.parametrize("law", ["coulomb", "tied", "frictionless"])
+@pytest.mark.parametrize(
+    "shapes",
+    [("mirrored", "tetrahedra"), ("tetrahedra", "hexahedra"), ("hexahedra", "tetrahedra")],
+)
+def test_nodes_that_match_without_their_facets_pass_a_constant_pressure_on(shapes, law):
+    result = run(cubes(shapes, law=law), figures=())
+    assert np.abs(result.pressure - 1).max() < 1e-9
+    assert max(np.abs(fields.von_mises - 1).max() for fields in result.fields) < 1e-8
+    made = result.reduction.coupling
+    assert made.kind == "mortar" and "the nodes match, but a constant pressure" in made.why
+    assert not result.summary["remarks"]
+    assert result.summary["pairs"]["upper-lower"]["coupled_because"] == made.why
+
+
+def test_matching_that_was_asked_for_fails_with_the_place_and_the_number():
+    scene = cubes(("mirrored", "tetrahedra"), coupling="matching")
+    said = "coupled by matching: a constant pressure gives body 'upper' wrong forces, by 0.4"
+    assert any(said in text for text in run(scene, figures=()).summary["remarks"])
+    checked = check_scene([scene])
+    assert any(said in note for note in checked.notes)
+    assert "by matching because the scene asks for it" in checked.text
+    same = reduce_bodies(cubes(("tetrahedra",) * 2, coupling="matching")).coupling
+    assert same.conforming and not same.remarks
+
+
+def test_a_search_goes_through_the_same_check():
+    result = run(
+        cubes(("tetrahedra", "hexahedra"), mu=0.0),
+        figures=(),
+        accuracy=1e-3,
+        quantity="pressure",
+        adaptive=True,
+    )
+    assert result.estimate.reached and result.estimate.value == pytest.approx(1, abs=1e-8)
+    assert len(result.estimate.levels) > 1 and not result.summary["remarks"]
+
+
+def asked(scene, **options):
+    """What the check says of a scene of one pair, and the coupling with its surfaces."""
+    reduction = reduce_bodies(scene, **options)
+    made, bodies = reduction.coupling, []
+    for body, part in zip(reduction.bodies, scene.parts):
+        from contactopt.bodies.assembled_elastic import AssembledElastic
+
+        bodies.append(AssembledElastic(body.body, part))
+    names = scene.pairs[0].surfaces
+    return made, tuple(body.surface(name) for body, name in zip(bodies, names))
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("side", ["upper", "lower"])
+@pytest.mark.parametrize("wrong", ["lost", "twice", "moved"])
+def test_a_wrong_mortar_is_found(monkeypatch, degree, side, wrong):
+    """A tenth of the force of one contact inside the surface is lost, counted twice, or acts on
+    nodes next to those that it should act on.
+    """
+    made, surfaces = asked(cubes(("tetrahedra", "hexahedra"), degree, coupling="mortar"))
+    assert misfit(made, surfaces) is None
+    inner = int(np.argmin(np.linalg.norm(made.positions[:2] - 0.5, axis=0)))
+    far = int(np.argmax(np.linalg.norm(made.positions[:2] - 0.5, axis=0)))
+    T = getattr(made, side).tolil()
+    row = 3 * inner
+    if wrong == "moved":
+        T[row] = 0.9 * T[row] + 0.1 * T[3 * far]
+    else:
+        T[row] = (0.9 if wrong == "lost" else 1.1) * T[row]
+    found = misfit(replace(made, **{side: T.tocsr()}), surfaces)
+    assert found is not None and found.side == ("upper", "lower").index(side)
+    assert 0.01 < found.error < 1
+
+
+@pytest.mark.parametrize("coupling", [None, "mortar"])
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("sectors", [8, 24])
+def test_curved_pairs_that_are_right_are_not_complained_about(sectors, degree, coupling):
+    for clearance in (0.0, 0.5, 2.0):
+        scene = turned.pin_in_bush(clearance=clearance, sectors=sectors)
+        assert not reduce_bodies(replace(scene, degree=degree), coupling=coupling).coupling.remarks
+    for ratio in ((sectors, sectors + 3), (sectors, 2 * sectors)):
+        scene = press_fit(ratio, degree, 0.001, degree == 1, degree == 2)[0]
+        assert not reduce_bodies(scene).coupling.remarks
+
+
+def test_every_coupling_is_asked_once(monkeypatch):
+    asked = []
+    kept = seam.misfit
+    monkeypatch.setattr(seam, "misfit", lambda *a: asked.append(a[0].kind) or kept(*a))
+    reduce_bodies(cubes(("mirrored", "tetrahedra")))
+    reduce_bodies(cubes(("tetrahedra", "tetrahedra")))
+    assert asked == ["matching", "mortar", "matching"]

@@ -1,0 +1,95 @@
+"""What a run says of a scene is so: no imbalance where nothing acts, no plane that is not there, no
+empty name, and no sign of a zero.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import MATERIAL, block, two_blocks
+
+from contactopt import InputError, Part, Plate, Scene, Support, run
+from contactopt.coupling.posed import posed
+from contactopt.figures import scene_check
+from contactopt.outcome import summary_rows
+from contactopt.readings.places import PLACED
+from contactopt.readings.quantities import ROWS, find_quantity
+from contactopt.scenes import SCENES, make_scene
+
+
+@pytest.mark.parametrize("moved", [-0.009, -0.5, 0.0, 3e-5])
+@pytest.mark.parametrize("kind", ["plane-strain", "solid"])
+def test_a_body_that_nothing_touches_is_in_equilibrium(moved, kind):
+    scene = two_blocks(kind)
+    up = scene.components[-1]
+    away = {name: 0.0 for name in scene.components} | {up: 1.0 + moved}
+    upper = replace(scene.upper, supports=(Support("top", away),), loads=())
+    result = run(replace(scene, upper=upper))
+    assert result.solution.solved and result.summary["remarks"] == []
+    assert result.summary["limits"]["bodies"]["upper"]["imbalance"] == 0.0
+
+
+def test_a_body_between_two_supports_that_strain_it_is_measured():
+    """Its forces are those of supports alone, and count."""
+    scene = two_blocks("plane-strain")
+    held = Support("top", {"x": 0.0, "y": 1.0}), Support("bottom", {"x": 0.0, "y": 1.1})
+    upper = replace(scene.upper, supports=held, loads=())
+    found = run(replace(scene, upper=upper)).summary["limits"]["bodies"]["upper"]
+    assert 0 < found["imbalance"] < 1e-9
+
+
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_no_list_of_planes_is_empty(name):
+    scene = make_scene(name, **({} if name == "rough" else {"elements": 4}))
+    for line in scene_check.check_scene([scene]).text.splitlines():
+        assert not line.rstrip().endswith(("normals", ":", ",")), line
+
+
+def test_images_without_a_plane_are_said_so(monkeypatch):
+    monkeypatch.setattr(scene_check, "posed", lambda scene: posed(scene)._replace(planes=()))
+    text = scene_check.check_scene([make_scene("punch-2d", elements=4)]).text
+    assert "2 images make the whole; no support holds a plane of symmetry" in text
+
+
+KINDS = {name.partition(":")[0].partition("@")[0] for name in (*ROWS, *PLACED)}
+
+
+@pytest.mark.parametrize("name", sorted(KINDS))
+@pytest.mark.parametrize("rest", ["", ":", "::", ":punch-foundation", ":nothing:x"])
+def test_no_refusal_names_an_empty_thing(name, rest):
+    try:
+        find_quantity(name + rest, make_scene("punch-2d"))
+    except InputError as error:
+        assert "''" not in str(error), error
+
+
+def test_zeros_have_no_sign():
+    scene = two_blocks("plane-strain")
+    upper = replace(scene.upper, loads=(Plate("top", {"y": -0.0}, glued=False),))
+    result = run(replace(scene, upper=upper))
+    words = " ".join(summary_rows(result.summary).values())
+    assert "-0 " not in words and "e-1" not in words.partition("residual")[0].split("method")[0]
+    for table in (result.summary["pairs"], result.summary["holders"]):
+        for own in table.values():
+            for value in (*own["force"], *own["moment"]):
+                assert value != 0 or np.copysign(1, value) > 0
+
+
+def test_the_approach_of_a_fit_around_a_body_has_no_number():
+    hub = block("axisymmetric", -1.0, 1.0)
+    hub = replace(hub, doflocs=hub.p + np.array([[0.98], [0.0]]), _boundaries=None)
+    hub = hub.with_boundaries({"bore": lambda x: x[0] < 1.0, "foot": lambda x: x[1] < -1 + 1e-9})
+    shaft = block("axisymmetric", -1.0, 1.0)
+    shaft = shaft.with_boundaries({"skin": lambda x: x[0] > 1.0 - 1e-9})
+    push = Plate("top", {"z": -0.01}, glued=False)
+    result = run(
+        Scene(
+            "fit",
+            Part("hub", hub, MATERIAL, (Support("foot", {"z": 0.0}),), contact="bore"),
+            Part("shaft", shaft, MATERIAL, (), (push,), contact="skin"),
+            0.15,
+            kind="axisymmetric",
+        )
+    )
+    assert result.solution.solved and result.summary["approach"] is None
+    assert "approach of the bodies" not in summary_rows(result.summary)
