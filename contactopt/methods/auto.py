@@ -204,7 +204,7 @@ class _Robust:
         yield from self.searched(constants.BRANCHES)
         yield from self.jammed(reached) if self.loose else self.restarted(reached)
 
-    def searched(self, branches: int) -> Iterator[Iterate]:
+    def searched(self, branches: int) -> Iterator[Iterate | Known]:
         """The points among the next branches of the tree; NoSolution if it ends without any."""
         if self.tree is None or self.tree.done:
             return
