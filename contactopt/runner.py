@@ -25,11 +25,11 @@ from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
 from contactopt.readings.chords import chord_remarks
 from contactopt.readings.corners import corner_remarks
-from contactopt.readings.peaks import Reading, pressure_reading
+from contactopt.readings.peaks import pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
 from contactopt.readings.quantities import quantity_of_states
-from contactopt.readings.resolution import remarks
+from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
 from contactopt.readings.validity import check_possible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from contactopt.scenes.scene_files import SceneFile
 
 Note = Callable[[str], None]
-APART = 0.05  # relative difference of two readings of the largest pressure that is told
 PATH_KEYS = (
     "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
 )  # fmt: skip
@@ -58,24 +57,12 @@ class Result(Outcome):
     __doc__ = Outcome.__doc__
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
-        """Write the result as one page to explore in a browser, and open it.
+        """Write the result as one page to explore in a browser, by default into a temporary file,
+        and open it. InputError if plotly is not installed, which the page takes its drawing program
+        from, or if the file, whose name ends in .html, cannot be written.
 
         The page needs no network and nothing but the browser (contactopt.figures.view_page says
         what is on it).
-
-        Parameters
-        ----------
-        file : where to write the page, ends in .html; None: a temporary file
-        show : whether to open it in the browser
-
-        Returns
-        -------
-        Path : of the page
-
-        Raises
-        ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or
-            if the file cannot be written
         """
         import tempfile
         import webbrowser
@@ -322,9 +309,10 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
     largest = max(pair["max_pressure"] for pair in found["pairs"].values())
     peak = pressure_reading(reduction, solution) if single else None
-    smoothed = [] if peak is None or not solution.solved else _smoothed(peak, largest)
+    more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    check_possible(limits, reduction.couplings)
+    if solution.solved and solved.path is None:  # the states of a path before are kept
+        check_possible(limits, reduction.couplings)
     known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
@@ -348,21 +336,10 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         "pressure": None if peak is None else peak.value,
         "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
         "products": solution.products,
-        "remarks": [*said, *smoothed],
+        "remarks": [*said, *more],
         **found,
         "limits": limits,
     }
-
-
-def _smoothed(peak: Reading, largest: float) -> list[str]:
-    """One sentence where the largest pressure at a node is not the one that is read around it."""
-    if abs(largest - peak.value) <= APART * abs(largest):
-        return []
-    return [
-        f"the largest pressure at a node is {largest:.4g}, and its"
-        f" neighbours suggest {peak.value:.4g}, give or take"
-        f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
-    ]
 
 
 def _written(

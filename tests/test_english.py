@@ -56,9 +56,12 @@ def texts():
                 yield path
 
 
+ANY = re.compile("|".join(CALQUES), re.I)
+
+
 def found(text):
-    text = re.sub(r"\s+(?:#\s+)?|\"\s*f?\"", " ", QUOTED.sub("", text))  # over ends of lines
-    return [match[0] for calque in CALQUES for match in re.finditer(calque, text, re.I)]
+    text = re.sub(r"\n\s*(?:#\s+)?|\"\s*f?\"", " ", QUOTED.sub("", text))  # over ends of lines
+    return ANY.findall(text)
 
 
 def test_no_calque_has_come_back():

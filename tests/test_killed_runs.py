@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ import numpy as np
 import pytest
 
 import contactopt
+from contactopt import Plate, Scene, runner
 from contactopt.files.writing import replace_file
+from contactopt.scenes import PATHS, SCENES, make_path, make_scene
 from contactopt.solving.restart import FILE, Restart, read_known
 
 SMALL = {
@@ -117,3 +120,47 @@ contactopt.run({name!r}, {str(tmp_path)!r}, **{options!r})
     assert ended.returncode == -signal.SIGKILL
     again = contactopt.run(name, tmp_path, resume=True, **options)
     np.testing.assert_allclose(numbers(again), numbers(contactopt.run(name, **options)), rtol=1e-3)
+
+
+def as_path(name: str) -> tuple[Scene, ...]:
+    """A named scene as a load path: its own, or half of its loads and all of them."""
+    size = {"elements": 4} if name != "rough" else {"points": 40}
+    if name in PATHS:
+        steps = {"hertz-dissimilar": 2, "rough": 2}.get(name, 1)
+        return make_path(name, steps=steps, **size)[:3]
+    scene = make_scene(name, **size)
+
+    def half(part: Any) -> Any:
+        if part.meshed:
+            return replace(part, loads=tuple(map(lighter, part.loads)))
+        force = part.force and {axis: value / 2 for axis, value in part.force.items()}
+        return replace(part, force=force)
+
+    def lighter(load: Any) -> Any:
+        if isinstance(load, Plate):
+            return replace(load, force={axis: value / 2 for axis, value in load.force.items()})
+        return replace(load, value=tuple(np.asarray(load.value) / 2))
+
+    return scene.with_parts(half), scene
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("name", sorted(SCENES))
+def test_every_named_scene_as_a_path_with_an_accuracy(name, adaptive, tmp_path, monkeypatch):
+    """Saved at each step, and resumed from the first, some middle and the last one."""
+    states = as_path(name)
+    if adaptive and any(part.elastic and not part.meshed for part in states[0].parts):
+        pytest.skip("a half-space has no elements to divide")
+    monkeypatch.setattr(runner, "_states", lambda *_: states)
+    options = {"figures": (), "accuracy": 0.5, "quantity": "energy", "adaptive": adaptive}
+    options["max_unknowns"] = 3000
+    with monkeypatch.context() as patched:
+        copies = kept_at_each_step(tmp_path, patched)
+        whole = contactopt.run(name, tmp_path / "whole", **options)
+    for number in {0, len(copies) // 2, len(copies) - 1}:
+        out = tmp_path / f"resumed-{number}"
+        out.mkdir()
+        shutil.copy(copies[number], out / FILE)
+        again = contactopt.run(name, out, resume=True, **options)
+        np.testing.assert_allclose(numbers(again), numbers(whole), rtol=1e-3, atol=1e-9)

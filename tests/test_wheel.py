@@ -31,7 +31,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    """Built from the source distribution of a copy of the sources: nothing is left behind."""
+    """Built from the source distribution of a copy of the sources: nothing is left behind here."""
     source = tmp_path_factory.mktemp("source")
     names = [
         *ROOT.joinpath("contactopt").rglob("*"),

@@ -3,7 +3,7 @@ then the proximal loop.
 
 0. Where the problem has no plates, and the package was installed with a compiler: FIRST_SWEEPS
    sweeps of the nonsmooth Gauss-Seidel method, accelerated after Anderson, if they cost little.
-   Where stage 1 fails, the sweeps go on for ten times as long. Where Q is a convolution,
+   Where stage 1 fails, the sweeps go on for twice as long. Where Q is a convolution,
    as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
@@ -75,10 +75,8 @@ NO_PROGRESS_JAMMED = (
 class Auto(Method):
     """The default method. It has no number to choose.
 
-    Parameters
-    ----------
-    preconditioner : Of Newton's steps where Q is known by its products: a name in
-        contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
+    `preconditioner` is that of Newton's steps where Q is known by its products: a name in
+    contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
     """
 
     preconditioner: str | None = None
@@ -208,6 +206,7 @@ class _Robust:
         """The points among the next branches of the tree; NoSolution if it ends without any."""
         if self.tree is None or self.tree.done:
             return
+        branches = min(branches, int(constants.BRANCH_WORK / self.problem.contacts**3))
         for found in islice(self.branches, branches):
             if found is not None:
                 self.met = True

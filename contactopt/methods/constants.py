@@ -11,7 +11,7 @@ from __future__ import annotations
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
 # Sweeps at first, and where Newton's method or the first proximal loop has failed; multiplications
 # that they may cost at first (1e6 take about a millisecond).
-FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 5000, 1e9
+FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 1000, 1e9
 LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
 SWEEPS_KEPT = 16  # last sweeps that the next one starts from
@@ -23,6 +23,7 @@ FEW_ENTRIES = 5000  # unknowns of an operator whose entries are asked for withou
 PROGRESS = 0.9  # a residual that falls by less than this factor is no progress
 BRANCHES = 300  # of the tree over the states of the contacts, at first
 MOST_STATES = {2: 100, 3: 10}  # contacts up to which it is tried, by the dimension
+BRANCH_WORK = 3e7  # branches at a time, times the cube of the contacts, which each costs
 CLOSE = 1e-3  # error of an interior point from which the proximal loop finds the last digits
 LEAST_ALPHA = 1e-4  # weight with which it begins there
 # residual of Newton's best point, over its forces, from which the proximal loop goes on at once

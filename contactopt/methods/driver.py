@@ -39,7 +39,7 @@ ROUGH = 1e-5  # accuracy of products in a rough certificate
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
 LEAST_PROOF = 0.3  # seconds for a proof past the time limit
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
-DOUBT = 30  # iterates before the proof is first looked for, then ten times as many, ...
+DOUBT, DEARER = 3, 0.25  # iterates before the proof is first looked for, and more per unknown
 SAME = 1e-11  # relative distance at which two iterates are the same state
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
 LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
@@ -189,7 +189,8 @@ def _follow(
 ) -> tuple[Status | None, str, Infeasible | None]:
     """Take iterates until they end, or a proof ends them: how, why, and the proof."""
     repeated: Status | None = None
-    message, proof, doubt = "", held_apart(recorder.problem), DOUBT
+    proof = held_apart(recorder.problem)
+    message, doubt = "", DOUBT + DEARER * scaled.q.size
     ended = None if proof is None else Status.INFEASIBLE
     while ended is None:
         begin = time.perf_counter()

@@ -31,6 +31,13 @@ def unit(t: np.ndarray) -> np.ndarray:
     return np.divide(t, length, out=np.zeros(t.shape), where=length > 0)
 
 
+def simplex_steps(entries: int) -> int:
+    """How many steps a linear program with so many entries may take: about five seconds, but
+    counted, so that the answer does not depend on the load of the machine.
+    """
+    return 300 + int(1e9 / max(entries, 1))
+
+
 def polygon(dim: int) -> tuple[np.ndarray, float]:
     """Directions (j, dim - 1) of a regular polygon, and by what it is wider than its inner disc."""
     if dim == 2:

@@ -22,12 +22,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.linear.operators import InterfaceOperator, asymmetry, diagonal
-from contactopt.problem.cones import polygon, unit
+from contactopt.problem.cones import polygon, simplex_steps, unit
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import dimensionless, isotropic
 
 MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
-FEWEST_STEPS, WORK = 300, 1e9  # of the simplex method: its least steps; steps times entries
 EXACT = 1e-12  # relative size of what rounding leaves of a zero in the conditions on a ray
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
 APART = 1e-9  # of the extent of the contacts, up to which tied nodes that are held meet
@@ -55,20 +54,12 @@ class Infeasible:
 
 
 def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infeasible | None:
-    """Look for a proof that a problem has no solution.
+    """Look for a proof that a problem has no solution; None says nothing. The linear program takes
+    `time_limit` [s] at most.
 
     Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not
     looked at. A positive definite Q without a plate needs no search: every such problem has a
     solution.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    time_limit : How long the linear program may take [s]; its steps are limited anyway.
-
-    Returns
-    -------
-    The proof. None says nothing: the problem may have a solution or not.
     """
     if (apart := held_apart(problem)) is not None:
         return apart
@@ -182,7 +173,6 @@ def _program(
     balance = sp.hstack([sp.csr_array(problem.V[normal].T), sp.csr_array((p, p))]) if p else None
     cost = np.concatenate([problem.q[:, 0], problem.s])
     cost = cost / (np.abs(cost).max(initial=0.0) or 1.0)
-    steps = FEWEST_STEPS + int(WORK / (A.nnz or 1))
     exact = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
     answer = linprog(
         cost,
@@ -192,7 +182,7 @@ def _program(
         np.zeros(p) if p else None,
         [(0, 1)] * k + [(-1, 1)] * p,
         method="highs",
-        options={"time_limit": time_limit, "maxiter": steps} | exact,
+        options={"time_limit": time_limit, "maxiter": simplex_steps(A.nnz)} | exact,
     )
     if answer.x is None or answer.fun is None or answer.fun > -1e-9:
         return None

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.errors import Unbalanced
-from contactopt.problem.cones import polygon
+from contactopt.problem.cones import polygon, simplex_steps
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import isotropic
 
@@ -32,7 +32,6 @@ SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the
 BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
 TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
-SECONDS = 5.0  # for a linear program
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +133,7 @@ def _search(
         np.append(1.0, np.zeros(equal.shape[0] - 1)),
         [(0, 1 / SURE)] * (2 * len(s)) + [(0, None)] * count,
         method="highs",
-        options={"time_limit": SECONDS},
+        options={"maxiter": simplex_steps(A.nnz)},
     )
     if answer.x is None or answer.status != 0:
         return None

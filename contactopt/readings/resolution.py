@@ -9,11 +9,13 @@ import numpy as np
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
+from contactopt.readings.peaks import Reading
 from contactopt.readings.resultants import views
 
 # elements across the half-width of contact; with so few the largest pressure is some percent off
 # (reports/accuracy)
 FEWEST = 4
+APART = 0.05  # relative difference of two readings of the largest pressure that is told
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 
 
@@ -35,9 +37,7 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
 
 
 def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on contacts that touch where the other surface ends and covers a part of their
-    faces.
-    """
+    """Sentences on contacts where the other surface ends and covers a part of their faces."""
     found = []
     for (view, own), coupling in zip(views(reduction, solution), reduction.couplings):
         touches = contact_status(view.problem, own.reactions).touching
@@ -67,3 +67,14 @@ def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, in
         if 0 < len(touching) < problem.contacts and len(touching) * images < strip:
             found.append(((pair.name, problem.contacts), touching + pair.start))
     return found
+
+
+def smoothed(peak: Reading, largest: float) -> list[str]:
+    """One sentence where the largest pressure at a node is not the one that is read around it."""
+    if abs(largest - peak.value) <= APART * abs(largest):
+        return []
+    return [
+        f"the largest pressure at a node is {largest:.4g}, and its"
+        f" neighbours suggest {peak.value:.4g}, give or take"
+        f" {peak.uncertainty:.2g}: refine the meshes there, or ask for an accuracy."
+    ]

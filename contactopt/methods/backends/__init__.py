@@ -93,7 +93,8 @@ _DAQP = {"primal_tol": TIGHT, "dual_tol": TIGHT}
 _EPS = {"eps_abs": TIGHT, "eps_rel": TIGHT}
 _HIGHS = {"primal_feasibility_tolerance": TIGHT, "dual_feasibility_tolerance": TIGHT}
 _MOREAU = {"ipm_settings": _CLARABEL}
-_OSQP = _EPS | {"max_iter": 200_000, "polishing": True}
+# by its clock OSQP would choose when it changes rho
+_OSQP = _EPS | {"max_iter": 200_000, "polishing": True, "adaptive_rho_interval": 50}
 _PROXQP = {"eps_abs": TIGHT, "eps_rel": 0.0, "max_iter": 1_000}
 _QOCO = {"abstol": TIGHT, "reltol": TIGHT, "max_iters": 200}
 _SCS = _EPS | {"max_iters": 200_000}
