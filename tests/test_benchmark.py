@@ -322,6 +322,7 @@ def test_errors_name_the_line(tmp_path, old, new, line, words):
 
 
 def test_the_command_line(tmp_path, capsys):
+    pytest.importorskip("pandas")
     path = written(tmp_path, SMALL)
     arguments = [
         "bench",
