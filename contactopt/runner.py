@@ -57,24 +57,12 @@ class Result(Outcome):
     __doc__ = Outcome.__doc__
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
-        """Write the result as one page to explore in a browser, and open it.
+        """Write the result as one page to explore in a browser, by default into a temporary file,
+        and open it. InputError if plotly is not installed, which the page takes its drawing program
+        from, or if the file, whose name ends in .html, cannot be written.
 
         The page needs no network and nothing but the browser (contactopt.figures.view_page says
         what is on it).
-
-        Parameters
-        ----------
-        file : where to write the page, ends in .html; None: a temporary file
-        show : whether to open it in the browser
-
-        Returns
-        -------
-        Path : of the page
-
-        Raises
-        ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or
-            if the file cannot be written
         """
         import tempfile
         import webbrowser
@@ -323,7 +311,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    if solution.solved:
+    if solution.solved and solved.path is None:  # the states of a path before are kept
         check_possible(limits, reduction.couplings)
     known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]

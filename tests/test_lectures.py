@@ -42,7 +42,7 @@ def test_a_slide_has_one_idea_and_notes_with_timing_and_a_question(number, lectu
         assert slide.text or slide.figure
         code = re.findall(r"```python\n(.*?)```", slide.text, re.S)
         assert all(len(block.splitlines()) <= CODE_LINES for block in code)
-        assert max([0, *map(len, "".join(code).splitlines())]) <= 56
+        assert max([0, *map(len, "".join(code).splitlines())]) <= 48
         timing = re.match(r"(\d+) min\. ", slide.notes)
         assert timing and "Ask: " in slide.notes and slide.notes.endswith("?"), slide.title
         minutes += int(timing[1])

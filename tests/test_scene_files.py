@@ -203,9 +203,9 @@ def test_blocks_in_other_kinds(tmp_path, kind, components):
 MISTAKES = [
     (
         'kind = "plane-strain"',
-        'kind = "plane-stress"',
+        'kind = "plane-shear"',
         1,
-        "there is no kind 'plane-stress'; choose from plane-strain",
+        "there is no kind 'plane-shear'; choose from plane-strain",
     ),
     ("thickness = 2.0", "thicknes = 2.0", 2, "there is no 'thicknes'; valid names are .*thickness"),
     ("thickness = 2.0", 'thickness = "2"', 2, "'thickness' must be a number"),

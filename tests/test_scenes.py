@@ -206,7 +206,7 @@ def test_bad_scenes_are_refused(make, message):
 @pytest.mark.parametrize(
     "change,message",
     [
-        (dict(kind="plane-stress"), "unknown kind"),
+        (dict(kind="plane-shear"), "unknown kind"),
         (dict(thickness=0.0), "thickness"),
         (dict(copies=0), "copies"),
         (dict(zone=-1.0), "zone"),

@@ -31,9 +31,7 @@ def run(*command: str | Path, cwd: Path) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    """Built from the source distribution of a copy of the sources, so that nothing is left behind in
-    the repository.
-    """
+    """Built from the source distribution of a copy of the sources: nothing is left behind here."""
     source = tmp_path_factory.mktemp("source")
     names = [
         *ROOT.joinpath("contactopt").rglob("*"),

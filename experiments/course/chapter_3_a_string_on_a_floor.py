@@ -342,7 +342,9 @@ ax.axhline(np.linalg.cond(Q_c), color="C0", ls="--", lw=1)
 ax.text(4e4, 2e5, "displacements", color="C3", ha="right")
 ax.text(4, 6, "forces", color="C0")
 ax.text(1.2, 1.2 * np.linalg.cond(Q_c), "forces, exact floor", color="C0")
-_ = ax.set(xlabel="spring of one node $k_p$ [N/mm]", ylabel="condition number [-]")
+_ = ax.set(
+    xlabel="spring of one node $k_p$ [N/mm]", ylabel="condition number [-]"
+)
 
 # %% [markdown]
 # So a code that works with displacements pays for a stiff penalty, and a code that works with forces

@@ -233,11 +233,14 @@ for name, label in (
 ):
     points = []
     for tol in (1e-2, 1e-4, 1e-6, 1e-8):
-        begin = time.perf_counter()
-        found = solve(problem, name, tol=tol, time_limit=3.0)
-        points.append((time.perf_counter() - begin, max(found.residual, 1e-14)))
+        seconds = []
+        for _ in range(3):  # the best of three
+            begin = time.process_time()
+            found = solve(problem, name, tol=tol, time_limit=3.0)
+            seconds.append(time.process_time() - begin)
+        points.append((min(seconds), max(found.residual, 1e-14)))
     ax.semilogy(*np.transpose(points), "o-", mfc="none", label=label)
-ax.set(xlabel="time [s]", ylabel="certificate [-]")
+ax.set(xlabel="CPU time [s]", ylabel="certificate [-]")
 ax.legend(frameon=False, fontsize=8)
 
 assert solve(problem, "augmented_lagrangian").solved
@@ -246,8 +249,8 @@ assert errors[0] > 5 * errors[1] > 25 * errors[2]
 
 # %% [markdown]
 # A chart like this one asks the right question: *how long does each method take to reach the same
-# certificate?* Every point is one run on the machine that drew the figure, so that small
-# differences of time say nothing. A fair comparison repeats each run, and uses many problems, as
+# certificate?* Every point is the best of three runs on the machine that drew the figure,
+# so that small differences of time say nothing. A fair comparison uses many problems, as
 # `contactopt bench` does.
 #
 # ## What more friction does
