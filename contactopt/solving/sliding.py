@@ -16,7 +16,8 @@ NEAR = 0.9  # share of what friction bears from which on a state without a stick
 
 class Sliding(NamedTuple):
     """A free motion along which friction gives way: its name, the load along it, and the largest
-    load that friction bears under the normal forces [force].
+    load that friction bears under the normal forces of the state before [force], nan if it bears
+    the load under those.
     """
 
     motion: str
@@ -40,15 +41,17 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
             continue
         V = problem.V.reshape(*problem.q.shape, -1)
         r_n = np.maximum(own.reactions[:, 0], 0.0)
-        slip, bound = np.linalg.norm(V[:, 1:], axis=1), problem.law.bound(r_n)[:, None]
-        # a tie has no bound, and bears nothing of a motion without slip
-        most = np.multiply(bound, slip, out=np.zeros_like(slip), where=slip > 0).sum(axis=0)
+        along = np.linalg.norm(V[:, 1:], axis=1)
+        # ties bear any friction, but nothing along a motion that does not move them
+        borne = np.broadcast_to(problem.law.bound(r_n)[:, None], along.shape)
+        most = np.multiply(borne, along, out=np.zeros_like(along), where=along > 0).sum(axis=0)
         load = np.abs(problem.s + r_n @ V[:, 0])
         slips = not contact_status(problem, ended.reactions).stick.any()
         worst = int(np.argmax(load - most))
         if load[worst] > (NEAR if slips else 1.0) * most[worst] > 0:
             name = problem.motions[worst] if problem.motions else f"motion {worst + 1}"
-            found = found or Sliding(name, float(load[worst]), float(most[worst]))
+            held = float(most[worst]) if own is before else np.nan
+            found = found or Sliding(name, float(load[worst]), held)
     return found
 
 
@@ -60,8 +63,6 @@ def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
     load = f"the load along {found.motion} is {found.load:.6g} {force}"
     held = "more than friction holds"
     if before:
-        held = (
-            f"and it held up to about {most:.6g} {force} in {before}; numbers and files are those"
-            f" of {before}"
-        )
+        held = held if np.isnan(most) else f"and it held up to about {most:.6g} {force} in {before}"
+        held += f"; numbers and files are those of {before}"
     return f"{state} slides, every touching contact slips: {load}, {held}"
