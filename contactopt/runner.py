@@ -62,24 +62,12 @@ class Result(Outcome):
         return result_card(self)
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
-        """Write the result as one page to explore in a browser, and open it.
+        """Write the result as one page to explore in a browser, by default into a temporary file,
+        and open it. InputError if plotly is not installed, which the page takes its drawing program
+        from, or if the file, whose name ends in .html, cannot be written.
 
         The page needs no network and nothing but the browser (contactopt.figures.view_page says
         what is on it).
-
-        Parameters
-        ----------
-        file : where to write the page, ends in .html; None: a temporary file
-        show : whether to open it in the browser
-
-        Returns
-        -------
-        Path : of the page
-
-        Raises
-        ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or
-            if the file cannot be written
         """
         import tempfile
         import webbrowser

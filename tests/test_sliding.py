@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from conftest import MATERIAL, block
 
-from contactopt import Part, Plate, Rigid, Scene, Support, run
+from contactopt import InterfaceProblem, Part, Plate, Rigid, Scene, Solution, Status, Support, run
+from contactopt.problem.laws.tied import Tied
 from contactopt.solving.follow import follow
 from contactopt.solving.restart import FILE, read_known
+from contactopt.solving.sliding import sliding
 
 
 def fitted(push, thick=0.02, kind="axisymmetric"):
@@ -96,3 +98,11 @@ def test_a_single_state_that_slides_says_so(tmp_path):
     )
     assert not any("so thin" in text for text in result.summary["remarks"])
     json.dumps(json.loads((tmp_path / "summary.json").read_text()), allow_nan=False)
+
+
+def test_a_tie_bears_nothing_of_a_motion_without_slip():
+    """Its bound is infinite: 0 times infinity is no number, and warned."""
+    V = np.array([[1.0], [0.0], [0.0]])
+    problem = InterfaceProblem(np.eye(3), np.zeros((1, 3)), law=Tied(), V=V, s=[1.0])
+    ended = Solution(np.ones((1, 3)), np.ones(1), Status.STALLED, 1.0, 0, "auto")
+    assert sliding(problem, ended, None) is None

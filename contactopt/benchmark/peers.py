@@ -105,13 +105,7 @@ class Peer:
     process: subprocess.Popen[str] | None = field(default=None, init=False)
 
     def found(self) -> tuple[str, str]:
-        """Find a Python that can import the solver.
-
-        Returns
-        -------
-        The Python, and the solver's version. InputError, with the line that installs it, if there
-        is none.
-        """
+        """A Python that imports the solver, and its version; InputError tells how to install it."""
         program = f"{inspect.getsource(self.version)}\nprint('VERSION', version())"
         for python in self.pythons:
             if version := _said(python, program):
@@ -121,17 +115,9 @@ class Peer:
     def answer(
         self, problem: InterfaceProblem, tol: float, time_limit: float, **settings: Any
     ) -> Answer:
-        """Let the solver answer a problem, which it gets in space and without units.
-
-        Parameters
-        ----------
-        problem : Without plates; InputError on one with plates.
-        tol, time_limit : The solver's own tolerance [-], and the most that it may take [s].
-        settings : What `prepare` gets besides.
-
-        Returns
-        -------
-        The forces in the problem's units, with what the solver says of them and what was measured.
+        """Let the solver answer a problem without plates, which it gets in space and without units.
+        The tolerance is the solver's own [-], `time_limit` is in seconds, and `prepare` gets the
+        settings.
         """
         if len(problem.s):
             raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")

@@ -48,19 +48,10 @@ class _Joints(NamedTuple):
 def copies(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray, mesh: skfem.Mesh, curve: Curve | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The nodes of a boundary with one copy for each side of a corner.
+    """The nodes of a boundary with one copy for each side of a corner: (f, j) the numbers of the
+    copies on each facet, corners first and cyclic, and (m,) the node of each copy.
 
-    Parameters
-    ----------
-    basis, degree : The basis of the displacement, of degree 1 or 2.
-    boundary : (f,) facets.
-    mesh : The mesh, which has the facets of the basis and may be curved where that is not.
-    curve : The curve of the boundary, or None.
-
-    Returns
-    -------
-    (f, j) the numbers of the copies on each facet, corners first and cyclic, and (m,) the node of
-    each copy.
+    `mesh` has the facets of the basis, and may be curved where that is not.
     """
     boundary = np.asarray(boundary)
     nodes = nodes_on(basis, degree, boundary)

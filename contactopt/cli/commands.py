@@ -44,15 +44,8 @@ def _changes(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve a scene, write its files and print its numbers.
-
-    Parameters
-    ----------
-    options : of the command `run`
-
-    Returns
-    -------
-    int : the exit code, 0 if it is solved, to the accuracy asked for, else 1
+    """Solve a scene, write its files and print its numbers. The exit code is 0 if it is solved, to
+    the accuracy asked for, else 1.
     """
     from contactopt.run_options import OPTIONS
     from contactopt.runner import run

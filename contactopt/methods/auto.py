@@ -78,10 +78,8 @@ NO_PROGRESS_JAMMED = (
 class Auto(Method):
     """The default method. It has no number to choose.
 
-    Parameters
-    ----------
-    preconditioner : Of Newton's steps where Q is known by its products: a name in
-        contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
+    `preconditioner` is that of Newton's steps where Q is known by its products: a name in
+    contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
     """
 
     preconditioner: str | None = None

@@ -120,9 +120,7 @@ class Diagnosis:
         return "\n".join(lines)
 
     def _threshold(self, name: str, what: str, field: str) -> str:
-        """What is guaranteed up to which friction, and where it is lost, rounded to the safe
-        side.
-        """
+        """What is guaranteed up to which friction, and where it is lost, rounded safely."""
         low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
         if self.exact and low == high:
             return f"{name}: {what} for every load if and only if mu < {low:.4g}"

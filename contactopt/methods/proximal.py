@@ -33,11 +33,8 @@ Pace = Literal["steady", "gentle", "eager"]
 
 @dataclass(frozen=True)
 class Proximal(Method):
-    """The proximal point method, whose subproblems are solved by Newton's method.
-
-    Parameters
-    ----------
-    alpha : First weight of the proximal term, in units of the mean compliance.
+    """The proximal point method, whose subproblems are solved by Newton's method. `alpha` is the
+    first weight of the proximal term, in units of the mean compliance.
     """
 
     alpha: float = 1e-3

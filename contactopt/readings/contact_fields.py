@@ -61,12 +61,8 @@ class ContactFields:
         }
 
     def rows(self, axes: Sequence[str], units: tuple[str, str]) -> tuple[list[str], np.ndarray]:
-        """The head of a table, with units, and one row per contact; status as in `status`.
-
-        Parameters
-        ----------
-        axes : Names of the coordinates.
-        units : Of length and stress.
+        """The head of a table with the units of length and stress, and one row per contact; status
+        as in `status`.
         """
         length, stress = units
         head = [*(f"{axis} [{length}]" for axis in axes), f"area [{length}^2]"]

@@ -25,9 +25,7 @@ ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and
 
 @dataclass(frozen=True, eq=False)
 class Resultant:
-    """A force (dim,) and its moment about the origin, in 2D (1,) about the third axis, in space
-    (3,).
-    """
+    """A force (dim,) and its moment about the origin, (1,) about the third axis in 2D or (3,)."""
 
     force: np.ndarray
     moment: np.ndarray

@@ -40,10 +40,9 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
             continue
         V = problem.V.reshape(*problem.q.shape, -1)
         r_n = np.maximum(own.reactions[:, 0], 0.0)
-        along = np.linalg.norm(V[:, 1:], axis=1)
-        # ties bear any friction, but nothing along a motion that does not move them
-        borne = np.broadcast_to(problem.law.bound(r_n)[:, None], along.shape)
-        most = np.multiply(borne, along, out=np.zeros_like(along), where=along > 0).sum(axis=0)
+        slip, bound = np.linalg.norm(V[:, 1:], axis=1), problem.law.bound(r_n)[:, None]
+        # a tie has no bound, and bears nothing of a motion without slip
+        most = np.multiply(bound, slip, out=np.zeros_like(slip), where=slip > 0).sum(axis=0)
         load = np.abs(problem.s + r_n @ V[:, 0])
         slips = not contact_status(problem, ended.reactions).stick.any()
         worst = int(np.argmax(load - most))
