@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.cards import card, count, force_unit, line
+from contactopt.cards import count, force_unit, line
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
 from contactopt.methods.method import NATIVE
@@ -57,11 +57,6 @@ class Outcome:
         contacts, residual = count(s["contact_nodes"], "contact"), f"residual {s['residual']:.1e}"
         aim = "" if self.estimate is None else repr(self.estimate)
         return line("Result", self.scene.name, s["status"], residual, contacts, states, aim)
-
-    def _repr_html_(self) -> str:
-        s = self.summary
-        rows = summary_rows(s) | remark_rows(s)
-        return card(f"{self.scene.name}, {self.scene.friction}", rows, pair_rows(s))
 
     @property
     def problem(self) -> InterfaceProblem:

@@ -61,7 +61,8 @@ class Lines:
     def note(self, text: str) -> None:
         """Say what is going on."""
         if not self.quiet:
-            print(f"  {text}", file=sys.stderr, flush=True)
+            sys.stderr.write(f"  {text}\n")
+            sys.stderr.flush()
 
     def count(self, words: str = "") -> None:
         """Another piece is done."""
