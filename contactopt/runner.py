@@ -56,6 +56,11 @@ BOUNDS = {"max_unknowns": "unknowns", "time_limit": "seconds", "max_memory": "me
 class Result(Outcome):
     __doc__ = Outcome.__doc__
 
+    def _repr_html_(self) -> str:
+        from contactopt.figures.notebook import result_card
+
+        return result_card(self)
+
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
         """Write the result as one page to explore in a browser, by default into a temporary file,
         and open it. InputError if plotly is not installed, which the page takes its drawing program

@@ -376,7 +376,7 @@ def test_an_experiment_without_figures_gets_the_usual_ones_and_an_optional_one_m
         ]
     )
     text = (tmp_path / "out" / "report.md").read_text()
-    assert text.count("*Table ") == 2 and text.count("*Figure ") == 2
+    assert text.count("*Table ") == 3 and text.count("*Figure ") == 2
     extra = (
         '\n[[figures]]\nkind = "success_table"\ncaption = "none"\nwhere = {setting ='
         ' "nowhere"}\noptional = true\n'

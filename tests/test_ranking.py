@@ -8,6 +8,7 @@ from contactopt.benchmark.ranking import (
     SHIFT,
     achieved,
     agreement,
+    coverage_table,
     leader_table,
     points,
     ranking,
@@ -140,3 +141,53 @@ def test_a_busy_machine_ranks_nobody_and_says_so():
     assert wall_over_cpu(busy) == pytest.approx(1.5) and "nothing is ranked" in warning(1.5)
     assert warning(wall_over_cpu(quiet)) == ""
     assert "rank (95 %)" in leader_table(quiet) and "rank (95 %)" not in leader_table(busy)
+
+
+def refusals(method, problems):
+    """Runs that a method refused: no time, no answer."""
+    made = [row for name in problems for row in rows(method, [(1e-6, np.inf, 0.0)], name)]
+    return [row | {"status": "refused", "claimed": False, "message": "no plates"} for row in made]
+
+
+def test_what_a_method_cannot_express_is_no_failure_and_ranks_nobody():
+    plain, plates = [f"p{n}" for n in range(5)], [f"v{n}" for n in range(7)]
+    table = [row for name in plain for row in rows("peer", [(1e-6, 1e-7, 0.01)], name)]
+    table += [row for name in plain for row in rows("ours", [(1e-6, 1e-7, 0.02)], name)]
+    table += [row for name in plates for row in rows("ours", [(1e-6, 1e-7, 1.0)], name)]
+    table += refusals("peer", plates)
+    found = ranking(points(pd.DataFrame(table)), 1e-6).set_index("method")
+    assert list(found.index) == ["peer", "ours"] and list(found["rank"]) == [1, 2]
+    assert list(found["of"]) == [5, 5] and list(found["solved"]) == [5, 5]
+    assert found["mean"].to_dict() == pytest.approx({"peer": 0.01, "ours": 0.02})
+    assert found["taken"].to_dict() == {"peer": 5, "ours": 12} and (found["problems"] == 12).all()
+    shown = leader_table(pd.DataFrame(table))
+    assert list(shown["takes"]) == ["5 of 12", "12 of 12"]
+    covered = coverage_table(pd.DataFrame(table)).set_index("method")
+    assert list(covered["takes"]) == ["12 of 12", "5 of 12"]
+    assert list(covered["solved of these"]) == ["12 of 12", "5 of 5"]
+    assert list(covered["says of the others"]) == ["", "no plates"]
+
+
+def test_a_method_that_takes_no_problem_of_a_table_hinders_no_ranking_there():
+    made = rows("a", [(1e-6, 1e-7, 0.1)]) + rows("b", [(1e-6, 1e-7, 0.2)])
+    table = pd.DataFrame([*made, *refusals("never", ["p"])])
+    assert list(ranking(points(table), 1e-6)["method"]) == ["a", "b"]
+    assert list(coverage_table(table)["takes"]) == ["1 of 1", "1 of 1", "0 of 1"]
+    alone = pd.DataFrame(refusals("never", ["p"]))
+    assert leader_table(alone).empty and len(coverage_table(alone)) == 1
+
+
+def test_a_problem_refused_at_one_tolerance_and_tried_at_another_is_a_failure():
+    tried = rows("coy", [(1e-3, 1e-2, 0.1)]) + refusals("coy", ["p"])
+    table = pd.DataFrame(tried + rows("a", [(1e-3, 1e-4, 0.1), (1e-6, 1e-7, 0.1)]))
+    found = ranking(points(table), 1e-6).set_index("method")
+    assert found.loc["coy", ["solved", "of", "taken"]].tolist() == [0, 1, 1]
+
+
+def test_methods_without_a_common_problem_are_not_compared():
+    made = rows("plane", [(1e-6, 1e-7, 0.1)], "2d") + refusals("plane", ["3d"])
+    made += rows("space", [(1e-6, 1e-7, 0.1)], "3d") + refusals("space", ["2d"])
+    shown = leader_table(pd.DataFrame(made))
+    assert list(shown["solved"]) == ["0 of 0", "0 of 0"]
+    assert list(shown["takes"]) == ["1 of 2", "1 of 2"]
+    assert len(coverage_table(pd.DataFrame(made))) == 2

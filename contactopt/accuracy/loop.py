@@ -161,7 +161,8 @@ class _Loop:
                 **facts,
             )
         )
-        self.options.note(f"{self.quantity.name} {reading.value:.6g}, estimated error {error:.1e}")
+        said = f"{self.quantity.name} {reading.value:.6g}, estimated error {error:.1e}"
+        self.options.note(f"mesh {len(self.levels)}: {said}")
         return self._stop()
 
     def _stop(self) -> str:

@@ -3,7 +3,8 @@
 The runs of a method on a problem are points: median time and worst
 certificate of the repeats, one for each tolerance asked. The time to an accuracy is read off their
 front, straight in logarithms; what does not reach it counts as its time limit, and times below
-NOISE count as NOISE.
+NOISE count as NOISE. A problem that a method refuses at every tolerance is not applicable to it: no
+failure, and nobody is ranked there. A ranking compares on the problems that all entrants take.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SHIFT = 1e-3  # s, of shifted geometric means
-NOISE = 1e-4  # s
+# s: the CPU clock read twice without work between differs by 0.3 us, once in a thousand by 6 us
+NOISE = 1e-6
 BUSY = 1.2  # wall over CPU time above which a machine is too busy for a ranking
 LEAST = 1e-17  # drawn and compared in place of a certificate of 0
 RESAMPLES, BATCH, SEED = 2000, 100, 0
 LIKELY = 2.5, 97.5  # percentiles of the ranks that bound an interval
 POINT = ["problem", "method", "tolerance"]
+REFUSED = "refused"  # status
 # what is known of a point: (of the table's column, how the repeats are joined)
 JOINED = {
     "cpu": ("cpu_seconds", "median"),
@@ -29,6 +32,7 @@ JOINED = {
     "residual": ("residual", "max"),
     "claimed": ("claimed", "all"),
     "status": ("status", "last"),
+    "refused": ("_refused", "all"),
     "limit": ("time_limit", "max"),
     "repeats": ("repeat", "count"),
 }
@@ -38,14 +42,36 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     """A row per problem, method and tolerance: times [s], worst certificate, memory."""
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
-    groups = table.assign(_memory=memory).groupby(POINT, sort=False)
+    refused = table["status"] == REFUSED
+    groups = table.assign(_memory=memory, _refused=refused).groupby(POINT, sort=False)
     times = groups["cpu_seconds"]
     quartiles = {"low": times.quantile(0.25), "high": times.quantile(0.75)}
     return groups.agg(**joined).assign(**quartiles).reset_index()
 
 
+def taken(points: pd.DataFrame) -> pd.DataFrame:
+    """Whether a method takes a problem (problem, method): False where it refused every run."""
+    refused = points.groupby(["problem", "method"], sort=False)["refused"].all()
+    return ~refused.unstack("method", fill_value=False).astype(bool)
+
+
+def comparable(points: pd.DataFrame) -> pd.DataFrame:
+    """The points of the entrants, which take some problem, on the problems that all of them take.
+
+    A method without a row on a problem was not run there, which counts as a failure.
+    """
+    takes = taken(points)
+    takes = takes.loc[:, takes.any()]
+    common = takes.index[takes.all(axis=1)]
+    return points[points["problem"].isin(common) & points["method"].isin(takes.columns)]
+
+
 def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.DataFrame:
     """Seconds to a certificate of `accuracy` (problem, method), inf if not reached."""
+    import pandas as pd
+
+    if points.empty:
+        return pd.DataFrame(dtype=float)
     fronts = points.groupby(["problem", "method"], sort=False)[[time, "residual", "limit"]]
     seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
     return seconds.unstack("method").fillna(np.inf)
@@ -67,34 +93,37 @@ def _seconds_to(
 
 
 def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
-    """The leader table at an accuracy: a row for each method, the best first.
+    """The leader table at an accuracy: a row for each method that takes a problem, best first.
 
-    `mean` and `wall mean` are shifted geometric means (1 ms) of CPU and wall time [s] over the
-    instances that somebody solved, a failure counted at its limit. `rank` is that of `mean`; `best`
-    and `worst` bound it in 95 % of the bootstrap samples of the problems. `over claim` is the
-    median of the certificate over the tolerance of claimed successes.
+    Compared are the problems that all these methods take. `mean` and `wall mean` are shifted
+    geometric means (1 ms) of CPU and wall time [s] over those of them that somebody solved, a
+    failure counted at its limit. `rank` is that of `mean`; `best` and `worst` bound it in 95 % of
+    the bootstrap samples of the problems. `taken` problems out of `problems` are not refused by the
+    method. `over claim` is the median of the certificate over the tolerance of claimed successes.
     """
     import pandas as pd
 
-    logs, solved = _logs(points, accuracy)
+    takes, shared = taken(points), comparable(points)
+    methods = takes.columns[takes.any()]
+    logs, solved = (made.reindex(columns=methods) for made in _logs(shared, accuracy))
     low, high = _rank_interval(logs.to_numpy(float))
-    claims = points[points["claimed"] & np.isfinite(points["residual"])]
-    tried = points[points["status"] != "refused"].groupby("method")["problem"].nunique()
-    means = mean_times(points, accuracy)
+    claims = shared[shared["claimed"] & np.isfinite(shared["residual"])]
+    means, wall = (mean_times(points, accuracy, time).reindex(methods) for time in ("cpu", "wall"))
     columns = {
-        "solved": solved.sum(),
+        "solved": solved.sum().astype(int),
         "of": len(logs),
-        "taken": tried.reindex(logs.columns, fill_value=0),
+        "taken": takes[methods].sum(),
+        "problems": len(takes),
         "mean": means,
         "over the least": means / means.min(),
-        "wall mean": mean_times(points, accuracy, "wall"),
-        "memory": points.groupby("method")["memory"].max(),
+        "wall mean": wall,
+        "memory": shared.groupby("method")["memory"].max().reindex(methods),
         "over claim": (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median(),
         "rank": means.rank(method="min", na_option="bottom").astype(int),
         "best": low,
         "worst": high,
     }
-    made = pd.DataFrame(columns, index=logs.columns).rename_axis("method").reset_index()
+    made = pd.DataFrame(columns, index=methods).rename_axis("method").reset_index()
     return made.sort_values(["rank", "method"], ignore_index=True)
 
 
@@ -104,6 +133,7 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
     shown = {
         "method": found["method"],
         "solved": [f"{n} of {all_}" for n, all_ in zip(found["solved"], found["of"])],
+        "takes": [f"{n} of {all_}" for n, all_ in zip(found["taken"], found["problems"])],
         "CPU [s]": found["mean"],
         "over the least": found["over the least"],
         "wall [s]": found["wall mean"],
@@ -116,9 +146,32 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
     return found.assign(**shown)[list(shown)]
 
 
+def coverage_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
+    """Which problems a method takes, how many of them it brings to a certificate, and what it says
+    of the others most often.
+    """
+    import pandas as pd
+
+    found = points(table)
+    takes = taken(found)
+    solved = np.isfinite(achieved(found, accuracy)).reindex_like(takes)
+    refused = table[table["status"] == REFUSED]
+    why = refused.fillna({"message": ""}).groupby("method")["message"].agg(lambda m: m.mode()[0])
+    made = pd.DataFrame({"taken": takes.sum(), "reached": solved.sum()}).sort_values(
+        ["taken", "reached"], ascending=False, kind="stable"
+    )
+    shown = {
+        "method": made.index,
+        "takes": [f"{n} of {len(takes)}" for n in made["taken"]],
+        "solved of these": [f"{n} of {all_}" for n, all_ in zip(made["reached"], made["taken"])],
+        "says of the others": why.where(~takes.all()).reindex(made.index).fillna(""),
+    }
+    return pd.DataFrame(shown).reset_index(drop=True)
+
+
 def mean_times(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.Series[float]:
     """Shifted geometric mean [s] of each method's time to an accuracy, as in `ranking`."""
-    return np.exp(_logs(points, accuracy, time)[0].mean()) - SHIFT
+    return np.exp(_logs(comparable(points), accuracy, time)[0].mean()) - SHIFT
 
 
 def _logs(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.benchmark.ranking import achieved, mean_times, points
+from contactopt.benchmark.ranking import achieved, comparable, mean_times, points
 from contactopt.benchmark.tables import INSTANCE, groups
 from contactopt.figures.style import (
     COLOURS,
@@ -134,7 +134,8 @@ def performance_profile(
     if accuracy is None:
         wide = _at_settings(table, metric, by)
     else:
-        wide = achieved(points(table), accuracy, "wall" if metric == "call_seconds" else "cpu")
+        time = "wall" if metric == "call_seconds" else "cpu"
+        wide = achieved(comparable(points(table)), accuracy, time)
     solvable = wide[np.isfinite(wide.min(axis=1))]
     ratio = solvable.div(solvable.min(axis=1), axis=0)
     largest = 1.3 * float(np.max(ratio.to_numpy()[np.isfinite(ratio.to_numpy())], initial=2.0))

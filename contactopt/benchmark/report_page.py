@@ -25,6 +25,7 @@ from contactopt.benchmark.ranking import (
     RESAMPLES,
     achieved,
     agreement,
+    comparable,
     points,
     ranking,
     reruns,
@@ -52,9 +53,11 @@ PROTOCOL = (
     "Methods are compared at the certificate that they reach, read off in logarithms between the"
     " tolerances asked. A certificate is computed here from the problem and the answer; what a"
     " method says of itself is in the column 'claimed'. CPU times are medians over the repeats."
-    " A failure counts as the time limit. Times below {noise:g} ms count as {noise:g} ms. Problems"
-    " that no method solves are left out of a ranking. The rank interval holds 95 % of {resamples}"
-    " bootstrap samples of the problems. {tau}"
+    " A failure counts as the time limit. Times below {noise:g} ms count as {noise:g} ms. A problem"
+    " that a method refuses is not applicable to it, which is no failure: a ranking compares on the"
+    " problems that all its methods take. The column 'takes' says how many each of them takes."
+    " Problems that no method solves are left out of a ranking. The rank interval holds 95 % of"
+    " {resamples} bootstrap samples of the problems. {tau}"
 )
 
 
@@ -138,7 +141,13 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
         "accuracies": accuracies,
         "times": [[[_plain(t) for t in row] for row in seconds.to_numpy()] for seconds in times],
         "leaders": [
-            {"group": group, "accuracy": a, "rows": _records(ranking(rows, a)), "problems": members}
+            {
+                "group": group,
+                "accuracy": a,
+                "rows": _records(ranking(rows, a)),
+                "problems": members,
+                "compared": sorted({number[name] for name in comparable(rows)["problem"]}),
+            }
             for group, rows, members in _groups(found, tags, number)
             for a in accuracies
         ],

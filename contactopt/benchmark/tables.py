@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.benchmark.ranking import SHIFT, leader_table
+from contactopt.benchmark.ranking import SHIFT, coverage_table, leader_table
 from contactopt.errors import InputError
 
 if TYPE_CHECKING:
@@ -98,5 +98,5 @@ def groups(table: pd.DataFrame, by: str) -> list[tuple[str, pd.DataFrame]]:
 
 
 TABLES: dict[str, Callable[..., Any]] = {
-    f.__name__: f for f in (leader_table, success_table, time_table)
+    f.__name__: f for f in (leader_table, coverage_table, success_table, time_table)
 }

@@ -27,8 +27,10 @@ contact i is
 which is zero at all contacts exactly at the solutions. A contact much stiffer than the mean has a
 larger rho_i, because there a small error of the displacement is a large error of the force. The
 certificate is the largest of all e_i, of (|r_t| - mu r_n) / F, and of the relative errors |V_j' r +
-s_j| / max(|s_j|, max_i |V_ij| F) of the balance. Where s_j is not zero F is at most F0 there: a
-body that flies away from all contacts, which makes L and F as large as one likes, balances nothing.
+s_j| / max(|s_j|, max_i |V_ij| F) of the balance. Forces of more than 1e4 F hide errors below their
+own rounding, 2^-52 |r_i| / F, which counts as one more error. Where s_j is not zero F is at most F0
+there: a body that flies away from all contacts, which makes L and F as large as one likes, balances
+nothing.
 
 What a certificate of at most tol promises for Coulomb friction, at every contact:
 
@@ -66,6 +68,8 @@ ACTS = 1e-6  # share of the largest force from which on a contact's displacement
 ROUNDED = 1e-6
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
 UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
+# rounding of r - rho u, over r, and how many times F the forces are from where on it counts
+ROUNDING, UNSEEN = 2.0**-52, 1e4
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
@@ -132,8 +136,10 @@ def natural_map_residual(
     u = d + w
     measure = yardsticks(problem, r, d, w)
     beyond = lengths(r[:, 1:]) - problem.law.bound_along(r)
+    largest = float(lengths(r).max()) / measure.force
     worst = max(
         float(measure.errors(problem.law, r, u).max()),
+        ROUNDING * largest if largest > UNSEEN else 0.0,
         float(beyond.max()) / measure.force,
         balance_residual(problem, r, measure.force),
         0.0 if moved is None else moved.accuracy,

@@ -120,6 +120,12 @@ class Scene:
         for part in self.parts:
             part.check_in(self.kind)
 
+    def _repr_html_(self) -> str:
+        # the one look upwards of this room, taken only where a notebook shows a scene
+        from contactopt.figures.notebook import scene_page
+
+        return scene_page(self)
+
     def _wrong(self, why: str) -> InputError:
         return InputError(f"scene '{self.name}': {why}")
 

@@ -86,10 +86,10 @@ function drawLeaders() {
   if (!chosen) return;
   table("leaders", [
     ...(ranked ? [["rank", "rank"], ["95 %", "interval", "", "ranks that resampling the problems leaves likely"]] : []), ["method", "method", "solver"], ["solved", "solved"], ["of", "of"],
-    ["taken", "taken", "", "problems that the method did not refuse"], ["CPU [s]", "mean", "", "shifted geometric mean, 1 ms; a failure counts as the time limit"],
+    ["takes", "takes", "", "problems of this group that the method does not refuse; it is compared on those that all methods take"], ["CPU [s]", "mean", "", "shifted geometric mean, 1 ms; a failure counts as the time limit"],
     ["over the least", "over the least"], ["wall [s]", "wall mean"], ["memory [MB]", "memory", "", "most that a run added"], ["certificate / asked", "over claim", "", "median over claimed successes"],
-  ], chosen.rows.map((row) => ({...row, interval: `${row.best} to ${row.worst}`})));
-  const members = chosen.problems, times = data.times[index()];
+  ], chosen.rows.map((row) => ({...row, interval: `${row.best} to ${row.worst}`, takes: `${row.taken} of ${row.problems}`})));
+  const members = chosen.compared, times = data.times[index()];
   const best = members.map((p) => Math.min(...times[p].map((t) => t ?? Infinity)));
   const solvable = members.map((p, i) => [p, best[i]]).filter(([, t]) => Number.isFinite(t));
   const most = Math.max(2, ...solvable.flatMap(([p, t]) => times[p].filter((s) => s !== null).map((s) => s / t)));
