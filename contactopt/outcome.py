@@ -12,6 +12,7 @@ from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
 from contactopt.methods.method import NATIVE
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.readings.quantities import unit_of
 from contactopt.readings.resultants import resultant_words
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
@@ -83,6 +84,11 @@ def _number(value: float | None, form: str = ".6g") -> str:
     return "unknown" if value is None else f"{value + 0.0:{form}}"
 
 
+def _measured(value: float, quantity: str, summary: dict[str, Any]) -> str:
+    """The value of a quantity with its unit."""
+    return f"{_number(value)} {unit_of(quantity, tuple(summary['units']))}".rstrip()
+
+
 def pair_rows(summary: dict[str, Any]) -> list[tuple[str, ...]]:
     """What each pair of surfaces carries: a head, whose second lines are units, and a row a pair.
 
@@ -118,12 +124,12 @@ def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
     for name, found in summary.get("quantities", {}).items():
         error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
         said = found.get("message") or f"its relative error on this mesh: {error}"
-        rows[name] = f"{found['value']:.6g}; {said}"
+        rows[name] = f"{_measured(found['value'], name, summary)}; {said}"
     if found := summary.get("accuracy"):
         error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
         rows[found["quantity"]] = (
-            f"{found['value']:.6g}, estimated relative error {error}, asked for"
-            f" {found['target']:g}: {found['message']}"
+            f"{_measured(found['value'], found['quantity'], summary)}, estimated relative error"
+            f" {error}, asked for {found['target']:g}: {found['message']}"
         )
         sizes = (str(level["unknowns"]) for level in found["levels"])
         rows["unknowns of the meshes"] = ", ".join(sizes)

@@ -165,7 +165,9 @@ def _run(
         restart.stopped(note)
         raise
     except InputError as error:
-        raise error if file is None else file.located(error) from error
+        if file is None:
+            raise
+        raise file.located(error) from error
 
 
 def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:

@@ -17,7 +17,7 @@ import pytest
 from conftest import two_blocks
 
 import contactopt
-from contactopt import Contact, Scene, Support, screen
+from contactopt import Contact, Plate, Scene, Support, screen
 from contactopt.cli import main
 from contactopt.outcome import pair_rows, summary_rows, time_words
 
@@ -57,6 +57,46 @@ def test_friction_is_compared_with_what_it_could_carry():
 def test_no_share_of_a_bound_that_is_not_there(law):
     summary = contactopt.run(moved(0.001, law), figures=()).summary
     assert columns(summary)["of bound"] == "-"
+
+
+SIZES = {"mm": 1e-3, "m": 1.0, "MPa": 1e6, "Pa": 1.0, "N": 1.0, "": 1.0}
+READ = ("approach", "shift", "energy", "pressure", "width", "stick", "normal_force", "shear_force")
+PLACES = ("resultant:upper-lower:x", "von_mises:lower", "pressure@0.5,0", "von_mises:lower@0.4,-1")
+
+
+def test_quantities_are_printed_in_their_units():
+    """The same blocks in mm and MPa and in m and Pa: values times their units are the same."""
+    read, base = (*READ, *PLACES), moved(0.0)
+    push = Plate("top", {"x": 0.3, "y": -3.0})
+    scene = replace(
+        base, bodies=(replace(base.bodies[0], supports=(), loads=(push,)), base.bodies[1])
+    )
+    shown = []
+    for length, stress, wide in (("mm", "MPa", 1.0), ("m", "Pa", 1e-3)):
+        bodies = []
+        for body in scene.bodies:
+            mesh = replace(body.mesh, doflocs=wide * body.mesh.p)
+            material = replace(body.material, E=body.material.E * wide**-2)
+            held = tuple(
+                Support(one.boundary, one.displacement and scaled(one.displacement, wide))
+                for one in body.supports
+            )
+            bodies.append(replace(body, mesh=mesh, material=material, supports=held))
+        own = replace(scene, bodies=tuple(bodies), units=(length, stress), thickness=wide)
+        names = [scaled_place(name, wide) for name in read]
+        rows = summary_rows(contactopt.run(own, figures=(), read=names).summary)
+        words = [rows[name].partition(";")[0].split() for name in names]
+        shown.append([float(value) * np.prod([SIZES[u] for u in unit]) for value, *unit in words])
+    assert shown[0] == pytest.approx(shown[1], rel=1e-4)
+
+
+def scaled(values, wide):
+    return {name: wide * value for name, value in values.items()}
+
+
+def scaled_place(name, wide):
+    kind, sign, place = name.partition("@")
+    return kind + sign + ",".join(f"{wide * float(x):g}" for x in place.split(",") if x)
 
 
 def test_the_answer_comes_first_and_files_last(result, tmp_path, capsys):
