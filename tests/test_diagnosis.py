@@ -495,3 +495,9 @@ def test_five_hundred_statements_are_true():
             check_states(problem, answer, said[0], seed)
             tried += 2
     assert tried > 500
+
+
+def test_no_statement_has_a_threshold_at_infinity():
+    """Without a coupling of normal and tangential motion friction loses nothing."""
+    text = str(diagnose(InterfaceProblem(np.eye(2), np.array([[-1.0, 0.3]]), mu=0.5)))
+    assert "uniqueness for every load and every mu" in text and "mu < inf" not in text

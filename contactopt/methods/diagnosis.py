@@ -122,6 +122,8 @@ class Diagnosis:
     def _threshold(self, name: str, what: str, field: str) -> str:
         """What is guaranteed up to which friction, and where it is lost, rounded safely."""
         low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
+        if low == np.inf:
+            return f"{name}: {what} for every load and every mu"
         if self.exact and low == high:
             return f"{name}: {what} for every load if and only if mu < {low:.4g}"
         text = f"{name}: {what} is not guaranteed"
