@@ -127,7 +127,7 @@ class Diagnosis:
         text = f"{name}: {what} is not guaranteed"
         if low > 0:
             text = f"{name}: {what} for every load if mu < {_rounded(low, np.floor):.3g}"
-        if np.isnan(high):
+        if not np.isfinite(high):  # not known, or never lost
             return text
         held = "with the plates held tangentially " if self.dragged else ""
         return f"{text}; {held}it is lost for some load at mu = {_rounded(high, np.ceil):.3g}"
