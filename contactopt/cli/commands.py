@@ -15,6 +15,7 @@ from contactopt.cards import count
 from contactopt.checks import overheard
 from contactopt.errors import InputError
 from contactopt.files.toml_table import parse
+from contactopt.screen import progress
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -49,7 +50,6 @@ def run(options: argparse.Namespace) -> int:
     """
     from contactopt.run_options import OPTIONS
     from contactopt.runner import run
-    from contactopt.screen import progress
 
     out = options.out or f"out/{Path(options.scene).stem}"
     silent = options.quiet or options.json
@@ -227,7 +227,8 @@ def bench(options: argparse.Namespace) -> int:
     for sentence in refusals(table):
         print(f"  {sentence}")
     print(f"results in {folder}: rows.parquet (read them with contactopt.benchmark.load)")
-    page = report_campaign(folder, options.file)
+    with progress("report", quiet=options.quiet):
+        page = report_campaign(folder, options.file)
     print(f"report: {page}")
     return 0
 
@@ -240,9 +241,13 @@ def report(options: argparse.Namespace) -> int:
     given = [Path(name) for name in options.names]
     folders = [path for path in given if path.is_dir() and any(path.glob("rows.*"))]
     if folders and len(folders) == len(options.names) and not options.run:
-        for folder in folders:
-            page = report_campaign(folder, others=options.merge, figures=options.figures)
-            print(f"report: {page}")
+        pages = []
+        with progress("reports", len(folders), quiet=options.quiet) as shown:
+            for folder in folders:
+                page = report_campaign(folder, others=options.merge, figures=options.figures)
+                pages.append(f"report: {page}")
+                shown.count()
+        print("\n".join(pages))
         return 0
     if options.merge or options.figures:
         raise InputError("--merge and --figures are for the folder of a campaign; name it first.")
