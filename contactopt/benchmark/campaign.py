@@ -79,6 +79,7 @@ def run_campaign(
         bar = tqdm(desc=e.name, unit="run", file=sys.stderr, disable=quiet, **done)
         with closing(run_locally(tasks, jobs, History(lines(store.path)))) as rows, bar:
             _keep(rows, store, bar)
+        store.keep_own()
         save(load(store.path, absent=True), folder / "rows.parquet")
     return folder
 

@@ -39,14 +39,22 @@ JOINED = {
 
 
 def points(table: pd.DataFrame) -> pd.DataFrame:
-    """A row per problem, method and tolerance: times [s], worst certificate, memory."""
+    """A row per problem, method and tolerance: times [s], worst certificate, memory.
+
+    Where wall time is above BUSY times CPU time, it counts in its place: the method slept, or let
+    somebody else compute.
+    """
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
     refused = table["status"] == REFUSED
     groups = table.assign(_memory=memory, _refused=refused).groupby(POINT, sort=False)
     times = groups["cpu_seconds"]
-    quartiles = {"low": times.quantile(0.25), "high": times.quantile(0.75)}
-    return groups.agg(**joined).assign(**quartiles).reset_index()
+    found = groups.agg(**joined)
+    found = found.assign(low=times.quantile(0.25), high=times.quantile(0.75))
+    elsewhere = (found["wall"] > np.maximum(BUSY * found["cpu"], NOISE)) & ~found["refused"]
+    for column in ("cpu", "high"):
+        found[column] = found[column].where(~elsewhere, found[["wall", column]].max(axis=1))
+    return found.reset_index()
 
 
 def taken(points: pd.DataFrame) -> pd.DataFrame:
@@ -219,9 +227,12 @@ def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def wall_over_cpu(table: pd.DataFrame) -> float:
-    """The median of wall time over CPU time of the calls: above BUSY nothing is ranked."""
+    """Wall time over CPU time of the calls, above BUSY of which nothing is ranked: the lower median
+    over the methods of each one's median, since one that sleeps says nothing of the machine.
+    """
     timed = table[table["cpu_seconds"] > NOISE]
-    return float((timed["call_seconds"] / timed["cpu_seconds"]).median())
+    ratios = (timed["call_seconds"] / timed["cpu_seconds"]).groupby(timed["method"]).median()
+    return float(ratios.quantile(0.5, interpolation="lower")) if len(ratios) else np.nan
 
 
 def warning(ratio: float) -> str:
@@ -230,5 +241,5 @@ def warning(ratio: float) -> str:
         return ""
     return (
         f"The median of wall time over CPU time is {ratio:.2f}, above {BUSY:g}: the machine was"
-        " busy, so nothing is ranked. The CPU times are shown as they are."
+        " busy, so nothing is ranked."
     )
