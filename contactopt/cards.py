@@ -27,14 +27,30 @@ def line(name: str, *facts: str) -> str:
     return f"{name}({', '.join(fact for fact in facts if fact)})"
 
 
-def card(title: str, rows: Mapping[str, object]) -> str:
-    """Write a small HTML table of names and values, for notebooks. All texts are escaped."""
-    cells = "".join(
+def card(title: str, rows: Mapping[str, object], table: Sequence[Sequence[str]] = ()) -> str:
+    """Write a small HTML table of names and values, for notebooks, above it if it is given another
+    whose first row is the head. All texts are escaped.
+    """
+    names = "".join(
         f'<tr><th scope="row" style="text-align:left">{html.escape(str(name))}</th>'
         f'<td style="text-align:left">{html.escape(str(value))}</td></tr>'
         for name, value in rows.items()
     )
-    return f"<table><caption>{html.escape(title)}</caption><tbody>{cells}</tbody></table>"
+    caption = f"<caption>{html.escape(title)}</caption>"
+    if table:
+        return f"{columns(table, caption)}<table><tbody>{names}</tbody></table>"
+    return f"<table>{caption}<tbody>{names}</tbody></table>"
+
+
+def columns(table: Sequence[Sequence[str]], caption: str = "") -> str:
+    """An HTML table below a caption, whose first row is the head. All texts are escaped."""
+    head, *rows = ([html.escape(cell).replace("\n", "<br>") for cell in row] for row in table)
+    top = "".join(f'<th scope="col">{cell}</th>' for cell in head)
+    body = "".join(
+        f'<tr><th scope="row">{name}</th>' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+        for name, *cells in rows
+    )
+    return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def force_unit(units: Sequence[str]) -> str:

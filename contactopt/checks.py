@@ -87,9 +87,7 @@ def given(value: Any) -> bool:
 
 
 def check_positive(**sizes: float) -> None:
-    """Raise InputError unless every size is a positive finite number. In a name _ stands for a
-    space in the message.
-    """
+    """Raise InputError unless every size is positive and finite. The message shows _ as a space."""
     for name, value in sizes.items():
         check_number(name.replace("_", " "), value, low=0.0)
 
@@ -101,17 +99,9 @@ def check_count(name: str, value: int) -> None:
 
 
 def real_array(name: str, value: Any) -> np.ndarray:
-    """Copy a value into an array of finite floats.
-
-    Parameters
-    ----------
-    name : What the value is, in the words of the message.
-    value : A number, a list of any depth, or an array.
-
-    Returns
-    -------
-    The numbers in the shape of the value. InputError on text, on rows of different lengths, on
-        complex numbers, and on numbers that are not finite.
+    """Copy a number, a list of any depth or an array into an array of finite floats. InputError,
+    which calls the value `name`, on text, rows of different lengths, complex numbers, and numbers
+    that are not finite.
     """
     try:
         array = np.asarray(value)
@@ -165,15 +155,8 @@ def short(value: object, most: int = 60) -> str:
 
 
 def meant(name: str, known: Iterable[str]) -> str:
-    """Ask whether one of the known names was meant by one that is not known.
-
-    Parameters
-    ----------
-    name, known : the unknown name, and those that there are
-
-    Returns
-    -------
-    str : the end of a sentence: '; did you mean ...?' where one is nearly the same, or a full stop
+    """The end of a sentence about an unknown name: '; did you mean ...?' where one of the known
+    names is nearly the same, or a full stop.
     """
     near = get_close_matches(name, known, 1)
     return f"; did you mean {near[0]!r}?" if near else "."
@@ -181,9 +164,7 @@ def meant(name: str, known: Iterable[str]) -> str:
 
 @contextmanager
 def said_once() -> Iterator[None]:
-    """Within, what is wrong with a body or a pair of bodies is said once, and not of each of its
-    meshes.
-    """
+    """Within, what is wrong with a body or a pair is said once, and not of each of its meshes."""
     said: set[Any] = set()
 
     def new(record: logging.LogRecord) -> bool:

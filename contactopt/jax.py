@@ -60,24 +60,13 @@ class Kink(UserWarning):
 def solve(
     Q: Any, q: Any, mu: Any, V: Any = None, s: Any = None, tol: float = TOL, **settings: Any
 ) -> tuple[jax.Array, jax.Array]:
-    """Solve an interface problem with Coulomb friction, differentiably by all its data.
+    """Solve an interface problem with Coulomb friction, differentiably by Q (k dim, k dim) [length
+    / force], q (k, dim) [length], mu, one number or (k,), and the motions V (k dim, p) and
+    resultants s (p,) [force]. The result is the reactions (k, dim) [force] and multipliers (p,)
+    [length].
 
-    Parameters
-    ----------
-    Q : (k dim, k dim) compliance [length / force].
-    q : (k, dim) displacements without forces, normal component first [length].
-    mu : Coefficients of friction, one number or (k,) [-].
-    V, s : Free motions (k dim, p) and their resultants (p,) [force]; none by default.
-    tol, settings : Of contactopt.solve.
-
-    Returns
-    -------
-    Reactions (k, dim) [force] and multipliers (p,) [length].
-
-    Raises
-    ------
-    InputError : Where JAX works in single precision, on data that contactopt.solve refuses, and
-        where no certified solution was found. JAX wraps the last two into errors of its own.
+    InputError where JAX works in single precision, on data that contactopt.solve refuses, and where
+    no certified solution was found. JAX wraps the last two into errors of its own.
     """
     _check_precision()
     q = jnp.asarray(q, float)
@@ -176,22 +165,12 @@ def _inverse(whole: Whole) -> tuple[Callable[..., Any], Callable[..., Any]]:
 def quantity(
     scene: str | Path | Scene, name: Any, parameters: str | Sequence[str], **options: Any
 ) -> Callable[[Any], jax.Array]:
-    """Make a function of JAX from the parameters of a scene to a quantity of its solution.
+    """A function of JAX from the values (j,) of parameters of a scene to a quantity of its
+    solution. Both have the names of contactopt.gradient, and the options are those of
+    contactopt.run; fields, one number per contact, are no parameters.
 
-    Parameters
-    ----------
-    scene, options : Of contactopt.run.
-    name, parameters : The quantity and the names of the parameters, as for contactopt.gradient.
-        Fields, one number per contact, are none of them.
-
-    Returns
-    -------
-    A function of the values of the parameters (j,) to one number.
-
-    Raises
-    ------
-    InputError : Where JAX works in single precision, for a quantity or a parameter that does not
-        exist, and where no certified solution was found.
+    InputError where JAX works in single precision, for a quantity or a parameter that does not
+    exist, and where no certified solution was found.
     """
     _check_precision()
     base = scene_of(scene)

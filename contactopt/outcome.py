@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.cards import card, count, force_unit, line
+from contactopt.cards import count, force_unit, line
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
 from contactopt.methods.method import NATIVE
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.readings.quantities import unit_of
 from contactopt.readings.resultants import resultant_words
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
@@ -22,9 +23,10 @@ if TYPE_CHECKING:
 
 LENGTHS = {
     "approach": "approach of the bodies",
-    "contact_half_width": "half-width of the contact",
-    "stick_half_width": "half-width of the stick zone",
+    "contact_half_width": "half-width of contact",
+    "stick_half_width": "half-width of sticking",
 }
+SHOWN = 0.05  # share of the wall time of a run that a phase takes whose time is printed
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +59,6 @@ class Outcome:
         aim = "" if self.estimate is None else repr(self.estimate)
         return line("Result", self.scene.name, s["status"], residual, contacts, states, aim)
 
-    def _repr_html_(self) -> str:
-        notes = {f"note {n}": text for n, text in enumerate(self.summary["remarks"], 1)}
-        return card(f"{self.scene.name}, {self.scene.friction}", summary_rows(self.summary) | notes)
-
     @property
     def problem(self) -> InterfaceProblem:
         return self.reduction.problem
@@ -86,44 +84,92 @@ def _number(value: float | None, form: str = ".6g") -> str:
     return "unknown" if value is None else f"{value + 0.0:{form}}"
 
 
-def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
-    """The numbers of a run in words and with units, for a terminal, a page or a notebook."""
+def _measured(value: float, quantity: str, summary: dict[str, Any]) -> str:
+    """The value of a quantity with its unit."""
+    return f"{_number(value)} {unit_of(quantity, tuple(summary['units']))}".rstrip()
+
+
+def pair_rows(summary: dict[str, Any]) -> list[tuple[str, ...]]:
+    """What each pair of surfaces carries: a head, whose second lines are units, and a row a pair.
+
+    `friction` is the sum of the sizes of all friction forces, as `normal` is that of the normal
+    ones, and `of bound` says which share it is of the sum that friction could carry.
+    """
     length, stress = summary["units"]
-    newton, backends = force_unit((length, stress)), ("normal_backend", "tangential_backend")
-    used = {summary[backend] for backend in backends} - {NATIVE}
-    by = f" with {' and '.join(sorted(used))}" if used else ""
-    rows = {
-        "status": f"{summary['status']}: {summary.get('message')}",
-        "residual (certificate)": _number(summary["residual"], ".2e"),
-        "unknowns of the bodies": str(summary["dofs"]),
-        "contacts": str(summary["contact_nodes"]),
-        "friction coefficient": f"{summary['mu']:g}",
-        "method": f"{summary['method']}{by}, {count(summary['outer_iterations'], 'iteration')}",
-        "sum of the normal forces": f"{_number(summary['normal_force'])} {newton}",
-        "largest pressure": f"{_number(summary['max_pressure'])} {stress}",
-    }
-    if summary["q"] == "implicit":
-        rows["Q"] = f"{summary['products']} products with vectors"
-    thick = summary.get("thickness")
-    depth = "" if thick is None else f" at a thickness of {thick:g} {length}"
-    for name, force in resultant_words(summary).items():
-        pair = summary["pairs"][name]
-        rows[f"contact '{name}'"] = (
-            f"force on the upper body {force} {newton}; largest pressure"
-            f" {_number(pair['max_pressure'])} {stress}; contact area"
-            f" {_number(pair['contact_area'])} {length}^2{depth}; {pair['open']} open,"
-            f" {pair['stick']} stick, {pair['slip']} slip; coupled by {pair['coupling']} because"
-            f" {pair['coupled_because']}"
-        )
+    newton = force_unit((length, stress))
+    units = (stress, f"{length}^2", newton, newton, "bound", "", "", "")
+    heads = ("peak", "area", "normal", "friction", "of", "stick", "slip", "open")
+    rows = [("contact", *(f"{head}\n{unit}".strip() for head, unit in zip(heads, units)))]
+    for name, pair in summary["pairs"].items():
+        friction, bound = pair.get("friction_force"), pair.get("friction_bound")
+        values = (pair["max_pressure"], pair["contact_area"], pair["normal_force"], friction)
+        share = "-" if not bound or friction is None else f"{100 * friction / bound:.3g} %"
+        counts = (str(pair[key]) for key in ("stick", "slip", "open"))
+        rows.append((name, *(_number(value, ".5g") for value in values), share, *counts))
+    return rows
+
+
+def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
+    """The numbers of a run beside those of its pairs in words and with units: first what was
+    found, then how far it can be trusted. A terminal, a page and a notebook show them.
+    """
+    length, stress = summary["units"]
+    rows = {}
+    if len(summary["pairs"]) == 1:
+        (force,) = resultant_words(summary).values()
+        rows["force on the upper body"] = f"{force} {force_unit((length, stress))}"
     for key, words in LENGTHS.items():
         if summary.get(key) is not None:
             rows[words] = f"{_number(summary[key])} {length}"
+    for name, found in summary.get("quantities", {}).items():
+        error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
+        said = found.get("message") or f"its relative error on this mesh: {error}"
+        rows[name] = f"{_measured(found['value'], name, summary)}; {said}"
     if found := summary.get("accuracy"):
         error = "unknown" if found["error"] is None else f"{found['error']:.1e}"
         rows[found["quantity"]] = (
-            f"{found['value']:.6g}, estimated relative error {error}, asked for"
-            f" {found['target']:g}: {found['message']}"
+            f"{_measured(found['value'], found['quantity'], summary)}, estimated relative error"
+            f" {error}, asked for {found['target']:g}: {found['message']}"
         )
         sizes = (str(level["unknowns"]) for level in found["levels"])
         rows["unknowns of the meshes"] = ", ".join(sizes)
-    return rows
+    return rows | _trust(summary)
+
+
+def _trust(summary: dict[str, Any]) -> dict[str, str]:
+    """How far an answer can be trusted, and of which model it is one."""
+    backends = ("normal_backend", "tangential_backend")
+    used = {summary[backend] for backend in backends} - {NATIVE}
+    by = f" with {' and '.join(sorted(used))}" if used else ""
+    why = "" if summary["status"] == "solved" else f" ({summary.get('message')})"
+    thick = summary.get("thickness")
+    products = f"{summary['products']} products with Q" if summary["q"] == "implicit" else ""
+    model = (
+        summary["kind"],
+        "" if thick is None else f"thickness {thick:g} {summary['units'][0]}",
+        f"friction coefficient {summary['mu']:g}",
+        count(summary["dofs"], "unknown"),
+        count(summary["contact_nodes"], "contact"),
+        products,
+    )
+    return {
+        "status": f"{summary['status']}{why}: certificate {_number(summary['residual'], '.1e')},"
+        f" {summary['method']}{by}, {count(summary['outer_iterations'], 'iteration')}",
+        "model": ", ".join(filter(None, model)),
+    }
+
+
+def remark_rows(summary: dict[str, Any]) -> dict[str, str]:
+    """The remarks of a run, numbered."""
+    return {f"note {n}": text for n, text in enumerate(summary.get("remarks", ()), 1)}
+
+
+def time_words(summary: dict[str, Any]) -> str:
+    """The wall time of a run, and of its phases that took more than SHOWN of it."""
+    seconds = summary["seconds"]
+    phases = [
+        f"{name} {value:.2f}"
+        for name, value in seconds.items()
+        if name != "total" and value > SHOWN * seconds["total"]
+    ]
+    return f"{seconds['total']:.1f} s: {', '.join(phases)}"

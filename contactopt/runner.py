@@ -56,25 +56,18 @@ BOUNDS = {"max_unknowns": "unknowns", "time_limit": "seconds", "max_memory": "me
 class Result(Outcome):
     __doc__ = Outcome.__doc__
 
+    def _repr_html_(self) -> str:
+        from contactopt.figures.notebook import result_card
+
+        return result_card(self)
+
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
-        """Write the result as one page to explore in a browser, and open it.
+        """Write the result as one page to explore in a browser, by default into a temporary file,
+        and open it. InputError if plotly is not installed, which the page takes its drawing program
+        from, or if the file, whose name ends in .html, cannot be written.
 
         The page needs no network and nothing but the browser (contactopt.figures.view_page says
         what is on it).
-
-        Parameters
-        ----------
-        file : where to write the page, ends in .html; None: a temporary file
-        show : whether to open it in the browser
-
-        Returns
-        -------
-        Path : of the page
-
-        Raises
-        ------
-        InputError : if plotly is not installed, which the page takes its drawing program from, or
-            if the file cannot be written
         """
         import tempfile
         import webbrowser
@@ -172,7 +165,9 @@ def _run(
         restart.stopped(note)
         raise
     except InputError as error:
-        raise error if file is None else file.located(error) from error
+        if file is None:
+            raise
+        raise file.located(error) from error
 
 
 def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:

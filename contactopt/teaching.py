@@ -10,15 +10,11 @@ from typing import Any
 
 
 class Slider:
-    """A figure for every value of a parameter, and a slider that chooses one; it needs neither a
-    network nor Python.
+    """A figure for every value of a parameter, drawn by the function `draw` of one value, and a
+    slider that chooses one. It needs neither a network nor Python.
 
-    Parameters
-    ----------
-    label : str What stands above the slider, the name of the parameter with its unit.
-    values : sequence of float The values of the parameter, in the order of the slider.
-    draw : function It is given one value and returns a matplotlib figure.
-    start : int The index of the value that is shown first.
+    `label` stands above the slider: the name of the parameter with its unit. `start` is the index
+    of the value that is shown first.
     """
 
     def __init__(

@@ -287,12 +287,13 @@ def test_what_one_mesh_cannot_tell_is_not_invented(capsys, tmp_path):
 def test_the_summary_has_one_line_for_each_pair(capsys, tmp_path):
     line = ["run", "stack", "--no-figures", "--out", str(tmp_path / "out")]
     main(line)
-    printed = capsys.readouterr().out.splitlines()
-    pairs = [line for line in printed if line.startswith("contact '")]
+    printed = [line.split() for line in capsys.readouterr().out.splitlines()]
     names = json.loads((tmp_path / "out/summary.json").read_text())["pairs"]
-    assert len(pairs) == len(names) > 1
-    for words, pair in zip(pairs, names.values(), strict=True):
-        assert f"{pair['stick']} stick" in words and "largest pressure" in words
+    rows = {line[0]: line[1:] for line in printed if line and line[0] in names}
+    assert len(rows) == len(names) > 1
+    for name, pair in names.items():
+        assert rows[name][-3:] == [str(pair[key]) for key in ("stick", "slip", "open")]
+        assert float(rows[name][0]) == pytest.approx(pair["max_pressure"], rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def games(tmp_path_factory):
 @pytest.mark.slow
 def test_no_game_with_the_clock_saves_time(games):
     _, _, table = games
-    cpu = points(table).set_index("method")["cpu"]
+    cpu = points(table).set_index("method")["counted"]
     for game in ("remembers", "sleeps", "forks", "leaves_a_child", "says_its_own_time"):
         assert cpu[game] > 0.14, (game, cpu[game])
     assert cpu["stops_the_clock"] > 0.14

@@ -53,7 +53,7 @@ def test_a_problem_without_a_solution_ends_infeasible_in_all_units(name, force, 
     assert np.sum(problem.q * e) < 0
 
 
-@pytest.mark.parametrize("force", [0.0, 1.0, 1e10])
+@pytest.mark.parametrize("force", [0.0, 1.0, 1e10, 1e28])
 @pytest.mark.parametrize("name", NOT_SOLVABLE)
 def test_no_forces_are_certified_where_there_is_no_solution(name, force):
     problem = NOT_SOLVABLE[name]

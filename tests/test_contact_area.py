@@ -6,7 +6,7 @@ import skfem
 from test_chords import press_fit
 
 from contactopt import Contact, Material, Part, Rigid, Scene, Support, run
-from contactopt.outcome import summary_rows
+from contactopt.outcome import pair_rows, summary_rows
 
 STEEL = Material(2e5, 0.3)
 
@@ -34,8 +34,10 @@ def test_every_pair_of_a_plane_scene_has_the_area_of_its_thickness():
         pair = summary["pairs"][f"block{i}-floor"]
         assert pair["contact_area"] == pytest.approx(5 * width)
         assert pair["contact_half_width"] == pytest.approx(width / 2)
-        words = summary_rows(summary)[f"contact 'block{i}-floor'"]
-        assert f"contact area {5 * width:g} length^2 at a thickness of 5 length" in words
+        head, *rows = pair_rows(summary)
+        assert rows[i][0] == f"block{i}-floor" and len(rows[i]) == len(head)
+        assert dict(zip(head, rows[i]))["area\nlength^2"] == f"{5 * width:g}"
+    assert "thickness 5 length" in summary_rows(summary)["model"]
 
 
 def test_a_disc_has_a_radius_and_a_ring_half_a_width():
@@ -45,7 +47,7 @@ def test_a_disc_has_a_radius_and_a_ring_half_a_width():
         pair = summary["pairs"]["block0-floor"]
         assert pair["contact_half_width"] == pytest.approx(half, rel=1e-3)
         assert pair["contact_area"] == pytest.approx(np.pi * ((inner + width) ** 2 - inner**2))
-        assert "thickness" not in summary_rows(summary)["contact 'block0-floor'"]
+        assert "thickness" not in summary_rows(summary)["model"]
 
 
 @pytest.mark.parametrize("mirror", [None, "z"])

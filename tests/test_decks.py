@@ -526,3 +526,14 @@ def test_bricks_of_27_nodes_in_any_order_of_their_middles(tmp_path):
     path.write_text(text.replace(f"\n{some}, ", f"\n{some}, 9"))
     with pytest.raises(InputError, match="27 nodes"):
         load_mesh(path)
+
+
+def test_shells_that_are_no_side_of_a_body_are_told(tmp_path, caplog):
+    """A shell beside the body, or fixed to it along one edge, was left out in silence."""
+    (tmp_path / "deck.inp").write_text(BRICK + "\n" + FACE)
+    assert "SKIN" in load_mesh(tmp_path / "deck.inp").boundaries
+    assert not caplog.text
+    fin = "*NODE\n500, 5, 0, 0\n501, 5, 1, 0\n*ELEMENT, TYPE=S4\n91, 1, 2, 501, 500\n"
+    (tmp_path / "deck.inp").write_text(BRICK + "\n" + FACE + fin)
+    load_mesh(tmp_path / "deck.inp")
+    assert "1 shells of the file are no sides" in caplog.text

@@ -39,3 +39,24 @@ def test_the_peak_of_a_narrow_ellipse_is_as_uncertain_as_it_is_wrong(across, mos
     """Claimed was the whole value wherever fewer than four contacts lay across the ellipse."""
     found = pressure_reading(*ellipse(across))
     assert abs(found.value - 1) < found.uncertainty < most
+
+
+def test_rounding_does_not_choose_among_equal_peaks():
+    """A pressure that alternates between two values was read at an end of the line or inside, as
+    its values differed in their last digits, and so another unit of length gave another reading.
+    """
+    k, rng = 17, np.random.default_rng(0)
+    places = np.arange(float(k))[None]
+    kind = SimpleNamespace(kind="plane-strain", analysis=SimpleNamespace(revolved=False))
+    found = set()
+    for _ in range(10):
+        forces = np.zeros((k, 2))
+        forces[:, 0] = np.where(np.arange(k) % 2, 0.9, 1.0) * (1 + 1e-15 * rng.normal(size=k))
+        problem = InterfaceProblem(
+            Q=np.eye(2 * k), q=np.zeros((k, 2)), mu=0.0, areas=np.ones(k),
+            coordinates=np.vstack([places, 0 * places]), chart=Chart(places, (False,)),
+        )  # fmt: skip
+        reduction = SimpleNamespace(problem=problem, scene=kind)
+        solution = SimpleNamespace(reactions=forces, residual=0.0)
+        found.add(round(pressure_reading(reduction, solution).value, 9))
+    assert len(found) == 1

@@ -157,6 +157,7 @@ def test_names_reach_the_page_as_text_only(tmp_path):
 
 
 def test_view_makes_the_page_of_an_earlier_run(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("plotly")
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     result = run(scenes.flat_punch(2, elements=4), tmp_path, figures=())

@@ -140,3 +140,18 @@ def test_every_coupling_is_asked_once(monkeypatch):
     reduce_bodies(cubes(("mirrored", "tetrahedra")))
     reduce_bodies(cubes(("tetrahedra", "tetrahedra")))
     assert asked == ["matching", "mortar", "matching"]
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("overlap", [-1e-3, 1e-5, 3e-3])
+def test_a_press_fit_of_straight_meridians_is_not_complained_about(degree, overlap):
+    """A gap changes the circles around the axis, and with them the areas, on straight lines too."""
+    shaft = tensor_mesh(np.linspace(0.5, 1 + overlap, 5), np.linspace(0, 1, 5))
+    hub = simplices(tensor_mesh(np.linspace(1, 2, 6), np.linspace(0, 1, 6)))
+    bodies = (
+        Part("shaft", rename(shaft, skin="x+"), MATERIAL, (Support("y-", {"z": 0}),), (), "skin"),
+        Part("hub", rename(hub, bore="x-"), MATERIAL, (Support("y-", {"z": 0}),), (), "bore"),
+    )
+    pair = Contact("hub", "shaft", 0.2)
+    scene = Scene("fit", bodies=bodies, contacts=(pair,), kind="axisymmetric", degree=degree)
+    assert not [note for note in check_scene([scene]).notes if "constant pressure" in note]

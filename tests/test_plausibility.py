@@ -1,5 +1,7 @@
 """Input that can be solved and is not what is meant: one sentence, the same in check and in run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import skfem
@@ -79,6 +81,13 @@ WRONG = {
 def test_what_is_probably_not_meant_is_told_by_check_and_by_run(name):
     changes, words = WRONG[name]
     assert any(words in note for note in said(pressed(**changes)))
+
+
+def test_a_plate_on_a_contact_surface_is_told():
+    scene = pressed()
+    one = replace(scene.bodies[0], loads=(Plate("low", {"y": -100.0}, glued=False),))
+    notes = said(replace(scene, bodies=(one, scene.bodies[1])))
+    assert any("the plate on 'low' of body 'one'" in note for note in notes)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3])

@@ -6,6 +6,7 @@ import ast
 import importlib
 import json
 import logging
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,7 +53,7 @@ def seen(tmp_path, capsys, text):
     """What the summary, the terminal, the page and a notebook show of a run."""
     out = tmp_path / "out"
     main(["run", "punch-2d", "--elements", "2", "--no-figures", "--html", "--out", str(out)])
-    assert f"note: {text}" in capsys.readouterr().out
+    assert re.search(rf"^note \d+ +{re.escape(text)}$", capsys.readouterr().out, re.M)
     assert text in json.loads((out / "summary.json").read_text())["remarks"]
     assert text in (out / "view.html").read_text()
     result = contactopt.run("punch-2d", elements=2)
@@ -135,7 +136,9 @@ def test_a_quiet_run_keeps_its_remarks(verbose, tmp_path, capsys, monkeypatch):
     line = ["run", "punch-2d", "--elements", "2", "--no-figures", "--out", str(out)]
     main([*line[:1], *verbose, *line[1:]])
     printed = capsys.readouterr()
-    assert "note: heard" in printed.out and ("heard" in printed.err) == (verbose != ["-q"])
+    assert re.search("^note 1 +heard$", printed.out, re.M) and ("heard" in printed.err) == (
+        verbose != ["-q"]
+    )
     assert "heard" in json.loads((out / "summary.json").read_text())["remarks"]
 
 

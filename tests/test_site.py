@@ -152,7 +152,7 @@ def test_slides_fit_and_their_formulas_and_figures_are_drawn(built):
             assert page.ask("all.length") >= 8
             long = [number for number, fits in enumerate(page.ask(FITS), 1) if not fits]
             assert not long, f"{file.name}: slides {long} are longer than the screen"
-            assert page.ask("document.querySelectorAll('main mjx-container').length") > 2
+            assert page.ask("document.querySelectorAll('main mjx-container').length") > 0
             assert page.ask("document.querySelectorAll('mjx-merror').length") == 0
             pictures = page.ask(
                 "[...document.querySelectorAll('figure img')].map((i) => i.naturalWidth)"

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from conftest import MATERIAL, block
 
-from contactopt import Part, Plate, Rigid, Scene, Support, run
+from contactopt import InterfaceProblem, Part, Plate, Rigid, Scene, Solution, Status, Support, run
+from contactopt.problem.laws.tied import Tied
 from contactopt.solving.follow import follow
 from contactopt.solving.restart import FILE, read_known
+from contactopt.solving.sliding import sliding, sliding_words
 
 
 def fitted(push, thick=0.02, kind="axisymmetric"):
@@ -96,3 +98,26 @@ def test_a_single_state_that_slides_says_so(tmp_path):
     )
     assert not any("so thin" in text for text in result.summary["remarks"])
     json.dumps(json.loads((tmp_path / "summary.json").read_text()), allow_nan=False)
+
+
+def test_a_tie_bears_nothing_of_a_motion_without_slip():
+    """Its bound is infinite: 0 times infinity is no number, and warned."""
+    V = np.array([[1.0], [0.0], [0.0]])
+    problem = InterfaceProblem(np.eye(3), np.zeros((1, 3)), law=Tied(), V=V, s=[1.0])
+    ended = Solution(np.ones((1, 3)), np.ones(1), Status.STALLED, 1.0, 0, "auto")
+    assert sliding(problem, ended, None) is None
+
+
+def test_a_load_that_the_state_before_held_is_not_what_it_held_up_to():
+    """Where the pressure falls and the load stays, the words were "the load is 100, and it held up
+    to about 100".
+    """
+    V = np.array([[0.0], [1.0]])
+    problem = InterfaceProblem(np.eye(2), np.zeros((1, 2)), mu=0.3, V=V, s=[100.0])
+    before, ended = (
+        Solution(np.array([[N, -0.3 * N]]), np.ones(1), status, 1.0, 0, "auto")
+        for N, status in ((500.0, Status.SOLVED), (300.0, Status.STALLED))
+    )
+    found = sliding(problem, ended, before)
+    words = sliding_words(found, dragged(1.0), "state 3", "state 2")
+    assert "more than friction holds; numbers and files are those of state 2" in words

@@ -231,6 +231,7 @@ def test_programs_refuse_what_has_none():
 
 
 def test_the_command_lists_shows_and_writes(tmp_path, capsys):
+    pytest.importorskip("h5py")
     assert main(["problems", "list", "--tier", "small", "--tag", "dim=3"]) == 0
     assert "problems: " in capsys.readouterr().out
     assert main(["problems", "show", "squeezed(size=2, mu=0.5)"]) == 0

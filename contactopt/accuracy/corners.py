@@ -67,9 +67,7 @@ def _singular(solved: Solved, peak: Peak) -> bool:
 
 
 def _kept(levels: Sequence[Level]) -> list[float]:
-    """The values of the levels at the place of the last one, from fine to coarse, each for elements
-    clearly larger.
-    """
+    """The values of the levels at the place of the last one, each for clearly larger elements."""
     last = levels[-1]
     kept: list[Level] = []
     for level in reversed(levels):

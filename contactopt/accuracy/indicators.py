@@ -150,22 +150,12 @@ def _of_shape(
 
 
 def read_once(solved: Solved, name: str) -> dict[str, Any]:
-    """Read a quantity from a solution, with an error estimate for this mesh.
+    """Read a quantity from a solution: its "value", its relative "error", None where one mesh says
+    nothing of it, and a "message" where it is infinite or missing. InputError if the scene does not
+    have it.
 
-    Parameters
-    ----------
-    solved : The solved scene.
-    name : Of contactopt.readings.quantities.
-
-    Returns
-    -------
-    "value" [unit of the quantity] and "error", relative; None where one mesh says nothing of it.
-        For a load path it is the error of the last state, after the slip that the states before it
-        found on this mesh. "message" is a sentence where the quantity is infinite or missing.
-
-    Raises
-    ------
-    InputError : For a quantity that the scene does not have.
+    For a load path it is the error of the last state, after the slip that the states before it
+    found on this mesh.
     """
     quantity = find_quantity(name, solved.reduction.scene)
     reading = read(quantity, solved)

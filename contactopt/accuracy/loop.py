@@ -48,34 +48,17 @@ def refine(
     adaptive: bool = False,
     bound: bool = False,
 ) -> tuple[Solved, Estimate]:
-    """Solve a scene, or a load path of several states, on meshes just fine enough for one quantity.
+    """Solve a scene, or a load path of several states, on meshes just fine enough for the relative
+    `accuracy` of one quantity, and estimate its error. InputError, before anything is solved, for a
+    quantity that the scene does not have and an accuracy out of range, and where the first mesh has
+    no solution.
 
     Meshes are refined everywhere, or with `adaptive` where the quantity needs it, each body by
     itself; a mortar coupling joins what no longer matches, and quadrilaterals and hexahedra become
     triangles and tetrahedra. Each solve begins with the last answer. The search ends short of the
-    target, with a sentence in the estimate, where the quantity does not converge or does not exist,
-    where the next mesh would pass a limit, and where a solve or a refinement fails.
-
-    Parameters
-    ----------
-    states : The scene, or the states of its load path.
-    quantity : A name of contactopt.readings.quantities, such as 'pressure', 'pressure:block-floor'
-        or 'von_mises:block:fillet'.
-    accuracy : Bound on the estimated relative error of the quantity, between 0 and 1.
-    options : How each mesh is solved.
-    limits : On unknowns, time and memory.
-    adaptive : Whether meshes are refined only where the quantity needs it.
-    bound : Whether the search ends with a guaranteed bound (contactopt.bounds).
-
-    Returns
-    -------
-    The scene solved on the last mesh, which is the best answer where a bound ended the search, and
-    the Estimate.
-
-    Raises
-    ------
-    InputError : For an unknown quantity, body, boundary, pair or place and an accuracy out of
-        range, before anything is solved; and where the first mesh has no solution.
+    target, with a sentence in the estimate and with the best answer, where the quantity does not
+    converge or does not exist, where the next mesh would pass a limit, and where a solve or a
+    refinement fails. With `bound` it ends with a guaranteed bound (contactopt.bounds).
     """
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     scene = states[-1]
@@ -178,7 +161,8 @@ class _Loop:
                 **facts,
             )
         )
-        self.options.note(f"{self.quantity.name} {reading.value:.6g}, estimated error {error:.1e}")
+        said = f"{self.quantity.name} {reading.value:.6g}, estimated error {error:.1e}"
+        self.options.note(f"mesh {len(self.levels)}: {said}")
         return self._stop()
 
     def _stop(self) -> str:

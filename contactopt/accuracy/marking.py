@@ -86,9 +86,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
 
 
 def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
-    """The scene as it is solved: with quadratic displacements the edges follow the curved
-    boundaries.
-    """
+    """The scene as it is solved: edges of quadratic displacements follow the curved boundaries."""
     if scene.degree == 1:
         return scene
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
@@ -155,9 +153,7 @@ def _with_meshes(scene: Scene, mesh: Callable[[Part], Any]) -> Scene:
 
 
 def unknowns(scene: Scene) -> int:
-    """The displacement components of all nodes of the meshes, at least as many as a mesh has
-    unknowns.
-    """
+    """The displacement components of all nodes of the meshes, at least as many as the unknowns."""
     total = 0
     for mesh in (part.mesh for part in scene.parts if hasattr(part, "mesh")):
         inner = (mesh.nfacets if scene.dim == 2 else mesh.nedges) if scene.degree == 2 else 0

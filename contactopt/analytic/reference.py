@@ -102,28 +102,12 @@ def dundurs(upper: Material | None, lower: Material | None) -> tuple[float, floa
 
 
 def ellipse(x: np.ndarray, a: float, peak: float) -> np.ndarray:
-    """Evaluate the half ellipse peak sqrt(1 - x^2 / a^2), which is zero outside of |x| < a.
-
-    Parameters
-    ----------
-    x : (n,) places [length].
-    a : The half-width [length].
-    peak : The value at x = 0 [stress].
-
-    Returns
-    -------
-    (n,) values [stress].
-    """
+    """The half ellipse peak sqrt(1 - x^2 / a^2) at places (n,), and zero for |x| >= a."""
     return np.asarray(peak * np.sqrt(np.maximum(0.0, 1 - np.square(np.asarray(x) / a))))
 
 
 def check_beta(beta: float) -> None:
-    """Check Dundurs' constant beta, which is less than one in size for every pair of materials.
-
-    Parameters
-    ----------
-    beta : The constant [-].
-    """
+    """InputError unless Dundurs' constant beta [-] is less than one in size, as it always is."""
     check_number("Dundurs' constant beta", beta, low=-1.0, high=1.0)
 
 

@@ -19,6 +19,7 @@ from contactopt.benchmark.store import Store, lines, load, require, save
 from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.writing import remove_files, whole_file
+from contactopt.screen import Lines, progress
 
 WRITTEN = ("rows.jsonl", "rows.parquet", "experiment.toml")  # by a campaign
 
@@ -52,9 +53,7 @@ def run_campaign(
     InputError : On an experiment that cannot be run, filters that no run matches, results in the
         folder without `resume`, and a folder that cannot be written to.
     """
-    require("pandas", "psutil", "pyarrow", "tqdm")
-    from tqdm import tqdm
-
+    require("pandas", "psutil", "pyarrow")
     e = experiment if isinstance(experiment, Experiment) else read_experiment(experiment)
     jobs = jobs if jobs is not None else os.cpu_count() or 1
     check_count("jobs", jobs)
@@ -75,25 +74,22 @@ def run_campaign(
                 store.append(row)
         left = [run for run in runs if run.key not in finished]
         tasks = [Task(run, e.name, e.plugins, *limits) for run in left]
-        done = {"total": len(runs), "initial": len(runs) - len(tasks)}
-        bar = tqdm(desc=e.name, unit="run", file=sys.stderr, disable=quiet, **done)
-        with closing(run_locally(tasks, jobs, History(lines(store.path)))) as rows, bar:
-            _keep(rows, store, bar)
+        bar = progress(e.name, len(runs), len(runs) - len(tasks), quiet)
+        with closing(run_locally(tasks, jobs, History(lines(store.path)))) as rows, bar as shown:
+            _keep(rows, store, shown)
         store.keep_own()
         save(load(store.path, absent=True), folder / "rows.parquet")
     return folder
 
 
-def _keep(rows: Iterable[dict[str, Any]], store: Store, bar: Any) -> None:
+def _keep(rows: Iterable[dict[str, Any]], store: Store, shown: Lines) -> None:
     """Store the rows as they come, and show the progress."""
     failed: Counter[str] = Counter()
     for row in rows:
         store.append(row)
         if not row["success"]:
             failed[row["status"]] += 1
-            words = ", ".join(f"{n} {status}" for status, n in failed.most_common())
-            bar.set_postfix_str(words, refresh=False)
-        bar.update()
+        shown.count(", ".join(f"{n} {status}" for status, n in failed.most_common()))
 
 
 def run_reports(

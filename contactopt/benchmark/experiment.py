@@ -121,7 +121,8 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
 
     Raises
     ------
-    InputError : On anything that cannot be run. The message names file and line.
+    InputError : On anything that cannot be run. The message names file and line. NothingToRun, one
+        of these, where what it names is missing here.
     """
     table, path = _checked(Path(path), quick), Path(path)
     _check_number_of_runs(table)

@@ -17,12 +17,7 @@ ENDS: dict[str, str] = _texts["statuses"]  # how runs end besides with a word of
 
 
 def help_text() -> str:
-    """Write every key of an experiment file as plain text, with an example each.
-
-    Returns
-    -------
-    The text, one line or two for each key.
-    """
+    """Every key of an experiment file as plain text, one line or two for each, with an example."""
     lines = ["keys of an experiment file, with an example each:", *_lines(EXPERIMENT)]
     lines += ["", "keys of a table [[figures]]; those from `by` on belong to some kinds only:"]
     lines += [

@@ -105,13 +105,7 @@ class Peer:
     process: subprocess.Popen[str] | None = field(default=None, init=False)
 
     def found(self) -> tuple[str, str]:
-        """Find a Python that can import the solver.
-
-        Returns
-        -------
-        The Python, and the solver's version. InputError, with the line that installs it, if there
-        is none.
-        """
+        """A Python that imports the solver, and its version; InputError tells how to install it."""
         program = f"{inspect.getsource(self.version)}\nprint('VERSION', version())"
         for python in self.pythons:
             if version := _said(python, program):
@@ -126,20 +120,11 @@ class Peer:
         dims: Collection[int] = (3,),
         **settings: Any,
     ) -> Answer:
-        """Let the solver answer a problem, which it gets without units.
+        """Let the solver answer a problem without plates, which it gets without units.
 
-        Parameters
-        ----------
-        problem : Without plates; InputError on one with plates, or in space for a solver of the
-            plane.
-        tol, time_limit : The solver's own tolerance [-], and the most that it may take [s].
-        dims : The dimensions that the solver takes, of 2 and 3. Without 2, a problem of the plane
-            gets a second tangent along which nothing moves.
-        settings : What `prepare` gets besides.
-
-        Returns
-        -------
-        The forces in the problem's units, with what the solver says of them and what was measured.
+        The tolerance is the solver's own [-], `time_limit` is in seconds, and `prepare` gets the
+        settings. `dims` are the dimensions that the solver takes, of 2 and 3: without 2, a problem
+        of the plane gets a second tangent along which nothing moves.
         """
         if len(problem.s):
             raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")

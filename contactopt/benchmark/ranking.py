@@ -41,8 +41,8 @@ JOINED = {
 def points(table: pd.DataFrame) -> pd.DataFrame:
     """A row per problem, method and tolerance: times [s], worst certificate, memory.
 
-    Where wall time is above BUSY times CPU time, it counts in its place: the method slept, or let
-    somebody else compute.
+    `counted` is CPU time, or wall time where that is above BUSY times CPU time: the method slept,
+    or let somebody else compute.
     """
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
@@ -52,8 +52,7 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     found = groups.agg(**joined)
     found = found.assign(low=times.quantile(0.25), high=times.quantile(0.75))
     elsewhere = (found["wall"] > np.maximum(BUSY * found["cpu"], NOISE)) & ~found["refused"]
-    for column in ("cpu", "high"):
-        found[column] = found[column].where(~elsewhere, found[["wall", column]].max(axis=1))
+    found["counted"] = found["cpu"].where(~elsewhere, found["wall"])
     return found.reset_index()
 
 
@@ -80,7 +79,8 @@ def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.Dat
 
     if points.empty:
         return pd.DataFrame(dtype=float)
-    fronts = points.groupby(["problem", "method"], sort=False)[[time, "residual", "limit"]]
+    column = "counted" if time == "cpu" else time
+    fronts = points.groupby(["problem", "method"], sort=False)[[column, "residual", "limit"]]
     seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
     return seconds.unstack("method").fillna(np.inf)
 

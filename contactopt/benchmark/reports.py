@@ -25,6 +25,7 @@ from contactopt.benchmark.tables import TABLES, select
 from contactopt.errors import InputError
 from contactopt.figures.style import save_figure
 from contactopt.files.writing import remove_files, whole_folder
+from contactopt.screen import progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -84,9 +85,11 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> list[Experi
             f"'{reports}' holds no table of these experiments;"
             " make one with: contactopt report --run quick"
         )
-    for layout in made:
-        folder = Path(reports) / layout.name
-        write_report(layout, folder, load(folder))
+    with progress("reports", len(made)) as shown:
+        for layout in made:
+            folder = Path(reports) / layout.name
+            write_report(layout, folder, load(folder))
+            shown.count()
     return made
 
 

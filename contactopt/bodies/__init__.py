@@ -31,22 +31,9 @@ BODIES: dict[type, tuple[str, str, str]] = {
 
 
 def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> AssembledBody:
-    """Assemble the body that models one part of a scene.
-
-    Parameters
-    ----------
-    scene, part : The scene and one of its parts.
-    elements, zone : Number of elements across the contact half-width, and the half-width that the
-        mesh resolves [length].
-
-    Returns
-    -------
-    The body as matrices, whose linear system is not solved yet.
-
-    Raises
-    ------
-    InputError : For a part of a class that no kind of body models, and for parts that cannot be
-        modelled.
+    """The body that models one part of a scene, with `elements` across the half-width `zone`
+    [length] of the contact; its linear system is not solved yet. InputError for a part that no kind
+    of body models.
     """
     for kind in type(part).__mro__:  # the class itself before what it derives from
         if kind in BODIES:

@@ -172,12 +172,7 @@ class AssembledBody(ABC):
         return Work()
 
     def guides(self) -> Guides | None:
-        """Find where the body is and which planes guide it.
-
-        Returns
-        -------
-        Its extent, and planes that may be planes of symmetry; None for a body without nodes.
-        """
+        """Its extent, and planes that may be planes of symmetry; None for a body without nodes."""
         return None
 
     @property
@@ -186,16 +181,7 @@ class AssembledBody(ABC):
         return np.zeros(0, dtype=int)
 
     def iterates(self, solver: str) -> bool:
-        """Say whether a solver of linear systems works by iteration on this body.
-
-        Parameters
-        ----------
-        solver : A name in contactopt.bodies.solvers.SOLVERS, or 'auto'.
-
-        Returns
-        -------
-        True for multigrid, False for factors.
-        """
+        """Whether a solver (a name in SOLVERS, or 'auto') works by iteration on this body."""
         return False
 
     @abstractmethod

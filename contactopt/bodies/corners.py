@@ -48,19 +48,10 @@ class _Joints(NamedTuple):
 def copies(
     basis: skfem.CellBasis, degree: int, boundary: np.ndarray, mesh: skfem.Mesh, curve: Curve | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The nodes of a boundary with one copy for each side of a corner.
+    """The nodes of a boundary with one copy for each side of a corner: (f, j) the numbers of the
+    copies on each facet, corners first and cyclic, and (m,) the node of each copy.
 
-    Parameters
-    ----------
-    basis, degree : The basis of the displacement, of degree 1 or 2.
-    boundary : (f,) facets.
-    mesh : The mesh, which has the facets of the basis and may be curved where that is not.
-    curve : The curve of the boundary, or None.
-
-    Returns
-    -------
-    (f, j) the numbers of the copies on each facet, corners first and cyclic, and (m,) the node of
-    each copy.
+    `mesh` has the facets of the basis, and may be curved where that is not.
     """
     boundary = np.asarray(boundary)
     nodes = nodes_on(basis, degree, boundary)
@@ -72,7 +63,9 @@ def copies(
     if not cut.any():
         known, number = np.unique(nodes, return_inverse=True)
         return number.reshape(nodes.shape), known
-    number = np.stack([nodes, _fans(nodes, joints.facets[:, ~cut])]).reshape(2, -1)
+    # the sides of a node: facets around it that hang together by smooth joints
+    side = joined(_common(nodes, joints.facets[:, ~cut])[0], nodes.size)
+    number = np.stack([nodes.ravel(), side])
     # at other nodes, and where more sides meet than there are directions, there is one copy
     at_corner = np.zeros(nodes.max() + 1, dtype=bool)
     at_corner[_common(nodes, joints.facets[:, cut])[1]] = True
@@ -184,10 +177,3 @@ def _common(nodes: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.stack([pairs[0, pair] * j + first, pairs[1, pair] * j + second]), nodes[
         pairs[0, pair], first
     ]
-
-
-def _fans(nodes: np.ndarray, smooth: np.ndarray) -> np.ndarray:
-    """(f, j) the number of the side that each node of each facet is on: sides are facets around
-    the node that hang together by smooth joints, pairs (2, m) of facets.
-    """
-    return joined(_common(nodes, smooth)[0], nodes.size).reshape(nodes.shape)

@@ -38,10 +38,6 @@ class Fields:
 
         Cells of second order are VTK's quadratic triangles and tetrahedra, biquadratic
         quadrilaterals and triquadratic hexahedra (22, 24, 28 and 29).
-
-        Parameters
-        ----------
-        path : The file.
         """
         import meshio
 

@@ -220,9 +220,7 @@ class Body(ABC):
         return None
 
     def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
-        """How far the body is from equilibrium, strained and turned; zeros without equations of its
-        own.
-        """
+        """How far it is from equilibrium, strained and turned; zeros without own equations."""
         return Validity()
 
     def grounded(self, modulus: float) -> Body:
@@ -233,7 +231,5 @@ class Body(ABC):
         return self
 
     def pulled(self, U: np.ndarray) -> Body:
-        """The body with its ground pulling it towards a displacement; its own self without a
-        ground.
-        """
+        """The body with its ground pulling it towards a displacement; itself without a ground."""
         return self

@@ -178,9 +178,7 @@ def stress_map(body: Assembly, region: Region, by_poisson: bool = False) -> Stre
 def _both_sides(
     offset: np.ndarray, row: np.ndarray, column: np.ndarray, in_plane: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of patches with their mirror images across the planes (dim, m) in which their places
-    lie.
-    """
+    """Points of patches with their mirror images in the planes (dim, m) through their places."""
     for axis, there in enumerate(in_plane):
         images = np.flatnonzero(there[row])
         other = offset[:, images].copy()

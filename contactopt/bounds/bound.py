@@ -91,7 +91,7 @@ class Bound:
         self.displacement = scene.admissible(before)
         self.strained = self.strains(self.displacement)
         self.balanced = self.balanced_with(scene.tractions, scene.solution.multipliers)
-        self.missing = _minus(self.balanced, self.strained)
+        self.missing = _sum(self.balanced, self.strained, -1)
         added = [new - old for new, old in zip(self.displacement, before)]
         stretched = self.strains(added)
         self.moved = self.size(stretched)
@@ -184,9 +184,5 @@ class Bound:
         return out
 
 
-def _minus(one: Data, other: Data) -> Data:
-    return [None if a is None else a - b for a, b in zip(one, other)]
-
-
-def _sum(one: Data, other: Data) -> Data:
-    return [None if a is None else a + b for a, b in zip(one, other)]
+def _sum(one: Data, other: Data, sign: int = 1) -> Data:
+    return [None if a is None else a + sign * b for a, b in zip(one, other)]

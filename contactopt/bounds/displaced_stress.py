@@ -45,15 +45,9 @@ def halved(mesh: Any) -> Halves:
 def displaced_stress(
     cells: Any, material: Material, nodal: np.ndarray, at: np.ndarray, r: np.ndarray | None
 ) -> np.ndarray:
-    """Components xx, yy, xy and the one across (e, s, 4) of the stress.
-
-    Parameters
-    ----------
-    cells : The triangles; `corners` are those of their quadrilaterals, if any.
-    material : Of the body.
-    nodal : (2, vertices and edges) displacements.
-    at : (3, s) shares of the vertices at the points.
-    r : (e, s) radii of the points in a body of revolution; None in plane strain.
+    """Components xx, yy, xy and the one across (e, s, 4) of the stress under displacements (2,
+    vertices and edges), at points with the shares (3, s) of the vertices. In a body of revolution
+    `r` are their radii (e, s).
     """
     lam, shear = lame(material)
     (i, j), edges = cells.between

@@ -108,7 +108,7 @@ class EquilibriumElements(Simplices):
 
     @cached_property
     def bilinear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Shape functions (e, 4, s) of the quadrilaterals, and their slopes (e, 4, 2, s), at the
+        """Shape functions (e, 4, s) of the quadrilaterals, and their slopes (e, 4, 2, s), at
         points.
         """
         places = np.einsum("dve,vs->des", self.mesh.p[:, self.mesh.t], self._points)
@@ -135,19 +135,11 @@ class EquilibriumElements(Simplices):
         moments: np.ndarray,
         answer: Any = None,
     ) -> tuple[np.ndarray, float]:
-        """The stress of the head of this module that is nearest to `stress`.
+        """The stress (e, s, 4) of the head of this module that is nearest to `stress`, and the
+        largest force by which an element is out of balance over the largest force on one.
 
-        Parameters
-        ----------
-        material, stress, force, held : As for Tetrahedra.equilibrated().
-        moments : (facets, 2, 2) of the tractions on the other boundary facets, vertex by vertex,
-            with the hat functions of the edge; of r times them in bodies of revolution.
-        answer : Not needed in the plane.
-
-        Returns
-        -------
-        The stress (e, s, 4), and the largest force by which an element is out of balance over the
-        largest force on one.
+        The arguments are those of Tetrahedra.equilibrated(), but `moments` (facets, 2, 2) take the
+        hat functions of the edge, in bodies of revolution times r, and `answer` is not needed.
         """
         g, number = self._given(held, moments).ravel(), self._numbers[0]
         free = np.isnan(g)
@@ -334,9 +326,7 @@ class EquilibriumElements(Simplices):
     def _divergences(
         self, own: np.ndarray, split: SplitTriangle, force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """(e, m, n) and (e, m) which divergences are wanted; others follow from the balance of the
-        element.
-        """
+        """(e, m, n) and (e, m) the wanted divergences; others follow from an element's balance."""
         n, ratio = split.stress.shape[-1], self.ratio[own]
         if self.revolved:
             by_node = split.nodes.reshape(-1, 2, n).swapaxes(0, 1).reshape(2, -1)

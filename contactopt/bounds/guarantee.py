@@ -49,17 +49,8 @@ class Guarantee:
 
 
 def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
-    """What is guaranteed of a quantity, and of the displacement.
-
-    Parameters
-    ----------
-    solved : A scene solved on its last mesh.
-    quantity : What is asked for.
-    value : Of the quantity there [its unit].
-
-    Returns
-    -------
-    The Guarantee, which says why where there is no bound.
+    """What is guaranteed of the displacement and of a quantity, whose value on the last mesh is
+    `value`. The Guarantee says why where there is no bound.
     """
     scene = solved.reduction.scene
     bodies = [getattr(body, "body", None) for body in solved.reduction.bodies]

@@ -74,16 +74,8 @@ class _Adjoint(NamedTuple):
 
 
 def interval(bound: Any, quantity: Quantity) -> tuple[float, float]:
-    """The exact value of a quantity lies within an interval: its middle and half its width.
-
-    Parameters
-    ----------
-    bound : The Bound of a solution.
-    quantity : One of LINEAR or the energy.
-
-    Returns
-    -------
-    Both in the unit of the quantity. InputError, one sentence, where there is no interval.
+    """The middle and half the width of an interval in which the exact value of a quantity lies,
+    which is one of LINEAR or the energy. InputError, one sentence, where there is no interval.
     """
     scene, problem = bound.scene, bound.scene.problem
     if reason := without_interval(scene.reduction, quantity):

@@ -76,13 +76,9 @@ class Tetrahedra(Simplices):
         return 2 * shear * strain + lam * trace * np.eye(d)
 
     def data(self, moments: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """(e, inputs) what determines the composite stress on the reference element.
-
-        Parameters
-        ----------
-        moments : (dim + 1, dim, e, dim) of tractions with the hat functions of `others` on the
-            facets of each element, whose normals point out of it.
-        force : (dim,) or (e, dim) per volume.
+        """(e, inputs) what determines the composite stress on the reference element: forces (dim,)
+        or (e, dim) per volume, and moments (dim + 1, dim, e, dim) of tractions with the hat
+        functions of `others` on the facets of each element, whose normals point out of it.
         """
         own = moments.reshape(-1, *moments.shape[2:])
         body = np.broadcast_to(self.ratio[:, None] * force, own.shape[1:])
@@ -158,22 +154,13 @@ class Tetrahedra(Simplices):
         moments: np.ndarray,
         answer: Answer,
     ) -> tuple[np.ndarray, float]:
-        """The data (e, inputs) of the stress s* of the head of this module.
+        """The data (e, inputs) of the stress s* of the head of this module, and the largest force
+        by which the hat function of a vertex was out of balance, over that of an element.
 
-        Parameters
-        ----------
-        material : Of the body.
-        stress : (e, dim + 1, dim, dim) of finite elements, at the vertices of each element.
-        force : (dim,) per volume.
-        held : (facets, dim) components in which a boundary facet is held, its traction unknown.
-        moments : (facets, dim, dim) of the other boundary facets: vertex by vertex those of the
-            traction with the hat functions [force per thickness].
-        answer : How the body answers forces.
-
-        Returns
-        -------
-        The data, and the largest force by which the hat function of a vertex was out of balance,
-        over that of an element.
+        `stress` (e, dim + 1, dim, dim) is that of finite elements at the vertices of each element,
+        and `force` (dim,) acts per volume. The boundary facets are held in the components `held`
+        (facets, dim), where their tractions are unknown; `moments` (facets, dim, dim) are those of
+        the other tractions, vertex by vertex with the hat functions [force per thickness].
         """
         known = (self.mesh.f2t[1] < 0)[:, None] & ~held
         balance = self._once(known.tobytes(), lambda: Balance(self.forces_of_moments, known))

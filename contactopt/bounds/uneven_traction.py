@@ -97,14 +97,9 @@ def least_energy(
     size: np.ndarray,
     square: np.ndarray,
 ) -> np.ndarray:
-    """An upper bound (f,) of the least energies of stresses in f elements, without divergence, with
-    tractions d on one facet whose moments are zero, and with none on the others.
-
-    Parameters
-    ----------
-    cells, material, elements : The elements of a body, what it is made of, and f of the elements.
-    size : (f,) area of the facets.
-    square : (f, 3, 3) integrals of d d' over the facets.
+    """An upper bound (f,) of the least energies of stresses in f `elements`, without divergence,
+    with tractions d on one facet whose moments are zero, and with none on the others. The facets
+    have areas `size` (f,), and `square` (f, 3, 3) are the integrals of d d' over them.
     """
     regular = regular_tetrahedron()
     points = regular.mesh.p

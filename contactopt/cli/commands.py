@@ -44,28 +44,18 @@ def _changes(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve a scene, write its files and print its numbers.
-
-    Parameters
-    ----------
-    options : of the command `run`
-
-    Returns
-    -------
-    int : the exit code, 0 if it is solved, to the accuracy asked for, else 1
+    """Solve a scene, write its files and print its numbers. The exit code is 0 if it is solved, to
+    the accuracy asked for, else 1.
     """
     from contactopt.run_options import OPTIONS
     from contactopt.runner import run
+    from contactopt.screen import progress
 
     out = options.out or f"out/{Path(options.scene).stem}"
     silent = options.quiet or options.json
-    result = run(
-        options.scene,
-        out,
-        note=lambda text: None if silent else print(f"  {text}", file=sys.stderr, flush=True),
-        **{name: getattr(options, name) for name in OPTIONS},
-        **_changes(options),
-    )
+    given = {name: getattr(options, name) for name in OPTIONS} | _changes(options)
+    with progress(Path(options.scene).stem, quiet=silent, lines=options.verbose > 0) as shown:
+        result = run(options.scene, out, note=shown.note, **given)
     if options.json:
         print(json.dumps(result.summary, indent=2))
     else:
@@ -75,27 +65,18 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _print_result(result: Any, out: str) -> None:
-    from contactopt.outcome import summary_rows
+    from contactopt.figures.output import SINGLE
+    from contactopt.outcome import pair_rows, remark_rows, summary_rows, time_words
+    from contactopt.screen import in_tables
 
     s = result.summary
-    print(s["scene"])
-    for name, words in summary_rows(s).items():
-        print(f"{name}: {words}")
-    for name, found in s.get("quantities", {}).items():
-        error = "unknown" if found["error"] is None else f"about {found['error']:.1e}"
-        said = found.get("message") or f"its relative error on this mesh: {error}"
-        print(f"{name} {found['value']:.6g}; {said}")
-    for remark in s["remarks"]:
-        print(f"note: {remark}")
+    print(in_tables(s["scene"], pair_rows(s), summary_rows(s) | remark_rows(s)))
     if (estimate := result.estimate) is not None:
         if estimate.guarantee is not None:
             print(estimate.guarantee.sentence)
         for one in estimate.levels:
             print(f"  {one.mesh}: {one.unknowns} unknowns, {one.value:.6g}, {one.seconds:.2f} s")
-    phases = ", ".join(f"{k} {v:.2f}" for k, v in s["seconds"].items() if k != "total")
-    print(f"{s['seconds']['total']:.1f} s: {phases}")
-    from contactopt.figures.output import SINGLE
-
+    print(time_words(s))
     names = sorted(file.name for file in Path(out).iterdir())
     single = [name for name in names if SINGLE.search(name)]
     listed = ", ".join(name for name in names if name not in single)

@@ -20,9 +20,7 @@ NAMES: dict[str, dict[str, str]] = json.loads(
 
 
 def script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """Write the completion script of a shell. The parser is changed: it takes none but
-    the known names afterwards.
-    """
+    """Write the completion script of a shell. The parser then takes none but the known names."""
     import shtab
 
     for commands in parser._actions:

@@ -17,12 +17,8 @@ OF_A_SCENE = ("run", "show", "check", "simplify", "export")
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Build the parser of the command line, with all commands and options.
-
-    Returns
-    -------
-    ArgumentParser : what it reads has the name of the function to execute in its attribute
-        `command`
+    """The parser of the command line, with all commands and options; the attribute `command` of
+    what it reads names the function to execute.
     """
     texts = tomllib.loads(files("contactopt.cli").joinpath("command_line.toml").read_text("utf-8"))
     texts["commands"]["bench"]["epilog"] = help_text()

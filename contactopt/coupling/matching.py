@@ -35,19 +35,10 @@ def couple_nodes(
     scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody
 ) -> Coupling:
     """The coupling whose contacts are the contact nodes of the lower body, or of the upper one if
-    that alone has a mesh.
+    that alone has a mesh. InputError if the contact nodes of two bodies do not match.
 
     Frames and areas are those of the body that the contacts belong to. The contacts are numbered
     along the chart.
-
-    Parameters
-    ----------
-    scene, pair : The kind of the scene, and the pair of surfaces.
-    upper, lower : The two bodies, of which at least one has a mesh.
-
-    Returns
-    -------
-    One contact for each pair of nodes. InputError if the contact nodes of two bodies do not match.
     """
     names, conforming = pair.surfaces, True
     if upper.meshed and lower.meshed:

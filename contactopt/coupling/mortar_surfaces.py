@@ -29,21 +29,12 @@ def couple_surfaces(
     scene: Scene, pair: Contact, upper: AssembledBody, lower: AssembledBody
 ) -> Coupling:
     """The mortar coupling of two bodies with meshes (contactopt.coupling.mortar), numbered along
-    the chart.
+    the chart: one contact for each node of the carrier that faces the other side. InputError if a
+    body has no mesh there, or if the surfaces face each other nowhere.
 
     The contacts are carried by the side that the pair names. Otherwise it is the one with more
     contacts where they face each other, unless a thin body on the other side has more nodes there
     than contacts: the thin one carries them then (contactopt.bodies.thickness).
-
-    Parameters
-    ----------
-    scene, pair : The kind of the scene, and the pair of surfaces.
-    upper, lower : The two bodies.
-
-    Returns
-    -------
-    One contact for each node of the carrier that faces the other side. InputError if a body has no
-    mesh on its contact surface, or if the surfaces face each other nowhere.
     """
     bodies = upper, lower
     meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]

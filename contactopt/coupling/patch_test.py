@@ -10,7 +10,8 @@ product with each sparse map.
 sides see one contact on faces of slightly different size and direction. Let c be the cosine of the
 angle between the normal of a contact and those of the nodes that it acts on, or between these and
 the faces around them. An area, and a component along a normal, then differ by 1 - c each, on both
-sides. A gap g between surfaces of curvature kappa changes areas by g kappa.
+sides. A gap g between surfaces of curvature kappa changes areas by g kappa. A
+surface of revolution has a second curvature |n_r| / r.
 
 **What is compared.** Where one surface ends on the faces of the other, or turns away from it, faces
 are covered in part. Nodes are compared unless a contact that acts on them also acts on the rim of
@@ -182,4 +183,7 @@ def _chords(made: Coupling, sides: list[_Side]) -> np.ndarray:
         for end in ends:
             np.maximum.at(size, end, length)
     bent = np.sqrt(2 * turn) / np.where(size > 0, size, np.inf)  # curvature
+    if any(side.mesh.measure[1] for side in sides):  # and that of the circles around the axis
+        r = np.abs(made.positions[0])
+        bent = bent + np.abs(made.frames[:, 0, 0]) / np.where(r > 0, r, np.inf)
     return np.asarray(CHORD * turn + GAP * np.abs(made.gap) * bent)

@@ -36,20 +36,10 @@ def _h5py() -> Any:
 
 
 def read_hdf5(path: Path) -> InterfaceProblem:
-    """Read the problem in an HDF5 file, in local or in global form.
+    """The problem in an HDF5 file, in local or in global form and in the units of the file.
 
-    Parameters
-    ----------
-    path : The file.
-
-    Returns
-    -------
-    The problem in the units of the file.
-
-    Raises
-    ------
-    InputError : If the file holds neither form, if its data lie in other files or are malformed, or
-        if h5py is not installed. Exceptions of h5py are not caught here.
+    InputError if the file holds neither form, if its data lie in other files or are malformed, or
+    if h5py is not installed. Exceptions of h5py are not caught here.
     """
     h5py = _h5py()
     with h5py.File(path, "r") as file:

@@ -45,20 +45,10 @@ class _Numbers:
 
 
 def read_text(path: Path) -> InterfaceProblem:
-    """Read the problem in a text file of Siconos.
+    """The problem in a text file of Siconos, in the units of the file, without a balance.
 
-    Parameters
-    ----------
-    path : The file.
-
-    Returns
-    -------
-    The problem in the units of the file, without a balance.
-
-    Raises
-    ------
-    InputError : If the sizes or the storage that the file names do not exist or do not fit.
-    ValueError : If what should be a number is none.
+    InputError if the sizes or the storage that the file names do not exist or do not fit, and
+    ValueError if what should be a number is none.
     """
     text = path.read_text(encoding="ascii", errors="replace")
     head = text.split(maxsplit=5)

@@ -116,6 +116,7 @@ def _write(
         followers="",
         arrows="loads, and normals from the lower to the upper body,",
         convention="A negative gap is an overlap. The arrow of a plate is its total force.",
+        pairs="",
         cells=f"<tr><td>{lines.removeprefix('<br>')}</td></tr>",
     )
     return write_html(

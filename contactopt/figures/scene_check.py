@@ -187,13 +187,9 @@ def _direction(n: np.ndarray) -> str:
     return f"({', '.join(f'{value:.3g}' for value in np.round(n, 6) + 0.0)})"
 
 
-def _size(own: Coupling) -> float:
-    return float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
-
-
 def _pair_lines(scene: Scene, pair: Any, own: Coupling) -> list[str]:
     """How the surfaces of a pair lie to each other before they are loaded."""
-    length, size = scene.units[0], _size(own)
+    length, size = scene.units[0], float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
     total = float(own.areas.sum())
     lines = [
         f"pair '{pair.name}': {pair.friction}; {count(len(own.gap), 'contact')} by {own.kind},"

@@ -20,11 +20,12 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import columns
 from contactopt.checks import short
 from contactopt.errors import InputError
 from contactopt.figures.html import check_installed, filled, write_html
 from contactopt.figures.page_data import page_data
-from contactopt.outcome import summary_rows
+from contactopt.outcome import pair_rows, summary_rows
 
 __all__ = ["check_installed", "write_page"]
 
@@ -92,9 +93,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
             "The page follows the slider; single stresses inside the bodies are those of the last"
             " state. The slip is that since the state before."
         )
-    rows = {
-        html.escape(name): html.escape(str(value)) for name, value in summary_rows(summary).items()
-    }
+    rows = {html.escape(name): html.escape(words) for name, words in summary_rows(summary).items()}
     remarks = (html.escape(text) for text in summary.get("remarks", ()))
     return filled(
         "view.html",
@@ -104,6 +103,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
         move="move" if data["dim"] == 2 else "turn",
         followers=followers,
         arrows="forces on the upper body",
+        pairs=columns(pair_rows(summary)),
         convention="Sign convention: the pressure is positive in compression; tractions are those"
         " on the upper body.",
         cells="".join(

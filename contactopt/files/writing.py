@@ -98,9 +98,7 @@ def replace_file(path: Path, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def _staging(folder: Path) -> Iterator[Path]:
-    """A hidden folder for files to come. Those of programs that were killed are removed, once they
-    are OLD.
-    """
+    """A hidden folder for files to come. Those of killed programs are removed once they are OLD."""
     for old in folder.glob(".contactopt-*"):
         with suppress(OSError):
             if time.time() - old.stat().st_mtime > OLD:

@@ -42,20 +42,10 @@ def give_back() -> None:
 def each(
     act: Callable[[Item], Result], items: Iterable[Item], parallel: Sequence[bool] | None = None
 ) -> tuple[Result, ...]:
-    """Apply a function to every item, some of them at the same time.
+    """The results of a function for every item, in their order. The items that `parallel` marks are
+    worked on at the same time, each in a thread that ends with the call; by default all are.
 
-    The threads end with the call. An exception of one item is raised here.
-
-    Parameters
-    ----------
-    act : The function of an item.
-    items : The items.
-    parallel : A mark for every item: those marked are worked on at the same time, each in its own
-        thread. By default all are.
-
-    Returns
-    -------
-    What the function returned, in the order of the items.
+    An exception of one item is raised here.
     """
     listed = list(items)
     marked = [True] * len(listed) if parallel is None else list(parallel)

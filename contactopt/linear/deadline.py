@@ -25,22 +25,14 @@ def check_time() -> None:
 
 
 def time_left() -> float:
-    """Tell how much time is left to the solve that runs.
-
-    Returns
-    -------
-    Seconds until its time limit, at least 0; infinite without a limit.
-    """
+    """Seconds until the time limit of the solve that runs, at least 0; infinite without a limit."""
     return max(_deadline.get() - time.perf_counter(), 0.0)
 
 
 def enough() -> float:
-    """Tell what share of its present residual the step that runs may leave.
-
-    Returns
-    -------
-    The residual at which the solve ends, over the present one; 0 where nobody asks for less than
-    all digits, and before the first residual is known.
+    """The share of its present residual that the step that runs may leave: the residual at which
+    the solve ends, over the present one. It is 0 where nobody asks for less than all digits, and
+    before the first residual is known.
     """
     return _enough.get()
 

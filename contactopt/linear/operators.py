@@ -116,17 +116,7 @@ class InterfaceOperator(LinearOperator):
     def scaled(
         self, factor: float, added: np.ndarray, counter: Counter | None = None
     ) -> InterfaceOperator:
-        """Make the operator factor Q + diag(added).
-
-        Parameters
-        ----------
-        factor, added : One number, and (n,).
-        counter : Counts its products; by default one of its own.
-
-        Returns
-        -------
-        The operator.
-        """
+        """The operator factor Q + diag(added), with added (n,), and by default a new counter."""
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
             return factor * self.product(X, accuracy) + added[:, None] * X
@@ -197,16 +187,7 @@ def dense(Q: Interface) -> np.ndarray:
 
 
 def diagonal(Q: Interface) -> np.ndarray:
-    """The diagonal of Q [length / force], or the estimate of it that an operator has.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-
-    Returns
-    -------
-    (n,).
-    """
+    """The diagonal (n,) of Q [length / force], or the estimate of it that an operator has."""
     if isinstance(Q, InterfaceOperator):
         return Q.diagonal
     return np.asarray(Q.diagonal())
@@ -251,16 +232,7 @@ def eigenvalue_bound(Q: np.ndarray | sp.csr_array) -> float:
 
 
 def held(Q: Interface) -> np.ndarray:
-    """The components that cannot move, because they are coupled to no other component.
-
-    Parameters
-    ----------
-    Q : Interface operator (n, n), of any form.
-
-    Returns
-    -------
-    (n,) mask.
-    """
+    """The mask (n,) of the components that cannot move: they are coupled to no other one."""
     if isinstance(Q, InterfaceOperator):
         return Q.held
     size = abs(Q)

@@ -45,9 +45,7 @@ STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and 
 
 
 def plane_curves(mesh: Any) -> dict[str, Curve | None]:
-    """By the name of each boundary of a plane mesh, '' for what has none, its curve, or None where
-    it is straight.
-    """
+    """By the name of each boundary of a plane mesh, '' for others: its curve, None if straight."""
     facets = mesh.boundary_facets()
     edges, points, owner, known = _edges(mesh, facets)
     ends = np.zeros((2, edges.shape[1]))

@@ -45,9 +45,7 @@ Shape = Callable[[np.ndarray], np.ndarray]
 
 
 def space_curves(mesh: Any) -> dict[str, Curve | None]:
-    """By the name of each boundary of a solid's mesh, '' for what has none, its surface, or None
-    where it is flat.
-    """
+    """By the name of each boundary of a solid's mesh, '' for others, its surface, None if flat."""
     skin, found = _Skin(mesh), dict[str, Any]()
     for name, label, mine in shares(mesh, skin.owner):
         found[name] = None

@@ -15,16 +15,12 @@ FEW, FAR = 0.25, 0.5
 
 
 class Curve:
-    """A function that moves points onto the line or surface that a boundary stands for.
+    """A function `place` that moves points (dim, m) [length] onto the line or surface that a
+    boundary stands for; messages call it `name`.
 
-    Parameters
-    ----------
-    place : Function of points (dim, m) [length] that returns their places (dim, m) [length].
-    known : Whether the user gave the curve, or the mesh has curved edges that define it. False: it
-        was guessed from the nodes of a polygon.
-    name : What messages call it.
-    given : Whether the user gave it, so that it may not be that of the mesh.
-    other : The other shape that a guess may have, a function of points; None where it has none.
+    It is `given` where the user gave it, so that it may not be that of the mesh. It is `known` also
+    where curved edges of the mesh define it; otherwise it was guessed from the nodes of a polygon,
+    and `other` is the other shape that the guess may have, if any.
     """
 
     other: Callable[[np.ndarray], np.ndarray] | None = None

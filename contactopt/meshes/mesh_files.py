@@ -8,7 +8,7 @@ a boundary of each. contactopt.meshes.mesh_repair holds what is repaired and wha
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -259,6 +259,7 @@ def _boundaries(
     corners = np.sort(mesh.facets[:, outer], axis=0)
     place = {tuple(facet): i for i, facet in enumerate(corners.T.tolist())}
     found: dict[str, np.ndarray] = {}
+    _tell_others(mesh, groups, dim, number, place)
     for name in groups.names(dim - 1):
         hits, others = [], list[tuple[int, ...]]()
         for i, elements in groups.members[name, dim - 1].items():
@@ -284,6 +285,25 @@ def _boundaries(
         elif inside.any() and name not in found:
             found[name] = outer[inside]
     return found
+
+
+def _tell_others(
+    mesh: skfem.Mesh, groups: FileGroups, dim: int, number: np.ndarray, outer: Container[Any]
+) -> None:
+    """Warn of shells and lines that are no side of the body, where this is the whole file."""
+    count, inner = 0, None
+    if mesh.nelements != sum(len(nodes) for _, nodes, own in groups.blocks if own == dim):
+        return
+    for kind, nodes, own in groups.blocks:
+        if own == dim - 1:
+            corners = nodes[:, : 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])]
+            keys = map(tuple, np.sort(number[corners], axis=1).tolist())
+            if others := [key for key in keys if key not in outer]:
+                inner = _inner(mesh) if inner is None else inner
+                count += sum(key not in inner for key in others)
+    if count:
+        said = "%d %s of the file are no sides of elements of the body: they are left out"
+        log.warning(said, count, "shells" if dim == 3 else "lines")
 
 
 def _inner(mesh: skfem.Mesh) -> set[tuple[int, ...]]:

@@ -88,9 +88,7 @@ def _across(axis: int, value: float, near: float, x: np.ndarray) -> np.ndarray:
 
 
 def rename(mesh: MeshQuad | MeshHex, **names: str) -> MeshQuad | MeshHex:
-    """The mesh with further names for some of its boundaries, new="old": rename(mesh,
-    contact="y-").
-    """
+    """The mesh with further names of boundaries, new="old": rename(mesh, contact="y-")."""
     return mesh.with_boundaries({new: mesh.boundaries[old] for new, old in names.items()})
 
 

@@ -92,35 +92,13 @@ def solvers_of(law: Law) -> list[str]:
 
 
 def default_method(settings: Mapping[str, Any]) -> str:
-    """Choose the method where none is named: `auto`, or `alternating` where the settings name a
-    backend.
-
-    Parameters
-    ----------
-    settings : The settings of the method.
-
-    Returns
-    -------
-    A name in METHODS.
-    """
+    """The method if none is named: `auto`, or `alternating` where the settings name a backend."""
     return "alternating" if settings.get("normal") or settings.get("tangential") else "auto"
 
 
 def find_method(name: str, **settings: Any) -> Method:
-    """Make the method of a name with its settings.
-
-    Parameters
-    ----------
-    name : A name in METHODS.
-    settings : The fields of the method that are not left as they are.
-
-    Returns
-    -------
-    The method.
-
-    Raises
-    ------
-    InputError : If there is no such method or setting, or a setting has a wrong value.
+    """The method of a name with its settings. InputError if there is no such method or setting, or
+    a setting has a wrong value.
     """
     if name not in METHODS:
         raise InputError(f"unknown method {name!r}; choose from {', '.join(METHODS)}.")

@@ -33,11 +33,8 @@ OVER = 1.6  # over-relaxation, between 1.5 and 1.8 in the literature
 
 @dataclass(frozen=True)
 class ADMM(Method):
-    """The alternating direction method of multipliers on r = z.
-
-    Parameters
-    ----------
-    rho : First weight of r = z, in units of the mean compliance. The iteration balances it later.
+    """The alternating direction method of multipliers on r = z. `rho` is the first weight of r = z,
+    in units of the mean compliance; the iteration balances it later.
     """
 
     rho: float = 1.0

@@ -72,13 +72,10 @@ class TwoStage(Method):
 class Alternating(TwoStage):
     """The alternating iteration of the paper: a normal and a tangential convex program in turn.
 
-    Parameters
-    ----------
-    normal : Name of the backend of the normal program.
-    tangential : Name of the backend of the tangential program. None: proxqp for intervals, clarabel
-        for discs.
-    relaxation : Fraction of each new tangential force that is taken, above 0 and at most 1.
-    preconditioner : Of the backend 'pcg', which needs products with Q only.
+    `normal` and `tangential` name the backends of the two programs; without a name the tangential
+    one is proxqp for intervals and clarabel for discs. `relaxation` is the fraction of each new
+    tangential force that is taken, above 0 and at most 1. `preconditioner` is that of the backend
+    'pcg', which needs products with Q only.
     """
 
     normal: str = "proxqp"

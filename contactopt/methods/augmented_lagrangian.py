@@ -34,12 +34,8 @@ from contactopt.problem.laws.law import Law
 
 @dataclass(frozen=True)
 class AugmentedLagrangian(Method):
-    """The augmented Lagrangian method, exact or in the variant of Uzawa.
-
-    Parameters
-    ----------
-    rho : Penalty of the exact variant, in units of one over the mean compliance.
-    explicit : Whether to take the variant of Uzawa, which chooses its own penalty.
+    """The augmented Lagrangian method, exact with the penalty `rho`, in units of one over the mean
+    compliance, or with `explicit` in the variant of Uzawa, which chooses its own penalty.
     """
 
     rho: float = 100.0

@@ -40,11 +40,8 @@ BRIDGES = ("clarabel", "cvxpy")
 class AcaryCadoux(Method):
     """The fixed point of Acary and Cadoux: one cone program after another.
 
-    Parameters
-    ----------
-    bridge : 'clarabel' calls that solver directly; 'cvxpy' solves contactopt.models.acary_cadoux as
-        it is written there.
-    backend : The conic backend behind cvxpy. The direct bridge knows clarabel only.
+    The `bridge` 'clarabel' calls that solver directly; 'cvxpy' solves
+    contactopt.models.acary_cadoux as it is written there, with the conic `backend`.
     """
 
     bridge: str = "clarabel"

@@ -120,16 +120,14 @@ class Diagnosis:
         return "\n".join(lines)
 
     def _threshold(self, name: str, what: str, field: str) -> str:
-        """What is guaranteed up to which friction, and where it is lost, rounded to the safe
-        side.
-        """
+        """What is guaranteed up to which friction, and where it is lost, rounded safely."""
         low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
         if self.exact and low == high:
             return f"{name}: {what} for every load if and only if mu < {low:.4g}"
         text = f"{name}: {what} is not guaranteed"
         if low > 0:
             text = f"{name}: {what} for every load if mu < {_rounded(low, np.floor):.3g}"
-        if np.isnan(high):
+        if not np.isfinite(high):  # not known, or never lost
             return text
         held = "with the plates held tangentially " if self.dragged else ""
         return f"{text}; {held}it is lost for some load at mu = {_rounded(high, np.ceil):.3g}"

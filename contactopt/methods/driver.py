@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.checks import check_number, real_array
+from contactopt.checks import check_number
 from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
 from contactopt.linear.stacked import Stacked
 from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
-from contactopt.methods.method import Iterate, Known, Method, at_rest
+from contactopt.methods.auto import Auto
+from contactopt.methods.method import Iterate, Known, Method, at_rest, dimensionless_start
 from contactopt.methods.notes import collected, remark
+from contactopt.methods.small import solve_small
 from contactopt.problem import (
     Infeasible,
     InterfaceProblem,
@@ -100,7 +102,11 @@ def solve(
     chosen = _method_for(problem, method, settings)
     limits = _Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
-        solution = _run(problem, chosen, limits, start)
+        solution, swept = None, None
+        if chosen == Auto() and start is None and limits.usual:
+            solution, swept = solve_small(problem, tol)
+        if solution is None:
+            solution = _run(problem, chosen, limits, start, swept)
         remark(problem, solution)
     return replace(solution, notes=tuple(notes))
 
@@ -138,10 +144,21 @@ class _Limits:
     time_limit: float
     progress: Callable[[int, float], None] | None
 
+    @property
+    def usual(self) -> bool:
+        """Whether a solve of a few milliseconds that ends with its first iterate meets them."""
+        told = self.progress is not None or self.change_tol is not None
+        return not told and self.max_iterations >= 1 and self.time_limit >= LEAST_PROOF
+
 
 def _run(
-    problem: InterfaceProblem, method: Method, limits: _Limits, start: Solution | None
+    problem: InterfaceProblem,
+    method: Method,
+    limits: _Limits,
+    start: Solution | None,
+    swept: np.ndarray | None,
 ) -> Solution:
+    """`swept`: where the first sweeps ended, which need no repetition."""
     begin = time.perf_counter()
     if problem.contacts == 0:
         return _without_contacts(problem, method, limits.tol)
@@ -156,7 +173,9 @@ def _run(
     scaled, scales = dimensionless(isotropic(problem))
     stretch = problem.law.stretch(problem.dim)
     scales = scales if stretch is None else replace(scales, stretch=stretch)
-    first = None if start is None else _dimensionless_start(start, problem, scales)
+    if swept is not None:
+        scaled.__dict__["swept"] = swept / scales.force
+    first = None if start is None else dimensionless_start(start, problem, scales)
     recorder = _Recorder(problem, scales, limits, first or at_rest(scaled))
     ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
     if not recorder.history:
@@ -257,21 +276,6 @@ def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> 
     if residual > tol:
         status, message = Status.SETTLED, "no contact could balance the load on the plate"
     return Solution(r, multipliers, status, residual, 0, repr(method), message=message)
-
-
-def _dimensionless_start(
-    start: Solution, problem: InterfaceProblem, scales: Scales
-) -> tuple[np.ndarray, np.ndarray]:
-    if not isinstance(start, Solution):
-        raise InputError(f"start must be a Solution; got {type(start).__name__}.")
-    r = real_array("the start's array of reactions", start.reactions)
-    multipliers = real_array("the start's array of multipliers", start.multipliers)
-    if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
-        raise InputError(
-            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs"
-            f" {problem.q.shape} and {problem.s.shape}."
-        )
-    return scales.to_dimensionless(r, multipliers)
 
 
 class _Recorder:

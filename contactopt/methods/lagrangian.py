@@ -37,11 +37,8 @@ INNER = 5000  # Uzawa steps in one tangential problem
 
 @dataclass(frozen=True)
 class Lagrangian(TwoStage):
-    """Uzawa's iteration on the friction forces inside the two-stage iteration.
-
-    Parameters
-    ----------
-    relaxation : Fraction of each new tangential force that is taken, above 0 and at most 1.
+    """Uzawa's iteration on the friction forces inside the two-stage iteration. `relaxation` is the
+    fraction of each new tangential force that is taken, above 0 and at most 1.
     """
 
     relaxation: float = 1.0

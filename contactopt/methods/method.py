@@ -7,7 +7,9 @@ from typing import Protocol
 
 import numpy as np
 
-from contactopt.problem import InterfaceProblem
+from contactopt.checks import real_array
+from contactopt.errors import InputError
+from contactopt.problem import InterfaceProblem, Scales, Solution
 from contactopt.problem.certificate import Moved
 
 Iterate = tuple[np.ndarray, np.ndarray]  # reactions (k, dim), multipliers (p,)
@@ -45,3 +47,19 @@ class Method(Protocol):
 def at_rest(problem: InterfaceProblem) -> Iterate:
     """No force, and no motion of the plates."""
     return np.zeros(problem.q.shape), np.zeros(len(problem.s))
+
+
+def dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> Iterate:
+    """Take a solution to start from to a problem's dimensionless form; InputError if it does not
+    fit.
+    """
+    if not isinstance(start, Solution):
+        raise InputError(f"start must be a Solution; got {type(start).__name__}.")
+    r = real_array("the start's array of reactions", start.reactions)
+    multipliers = real_array("the start's array of multipliers", start.multipliers)
+    if r.shape != problem.q.shape or multipliers.shape != problem.s.shape:
+        raise InputError(
+            f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs"
+            f" {problem.q.shape} and {problem.s.shape}."
+        )
+    return scales.to_dimensionless(r, multipliers)

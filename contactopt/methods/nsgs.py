@@ -40,11 +40,8 @@ OFTEN = 100  # contacts between two looks at the clock
 
 @dataclass(frozen=True)
 class NSGS(Method):
-    """Nonsmooth Gauss-Seidel: the law at one contact after another.
-
-    Parameters
-    ----------
-    relaxation : Fraction of each local change that is taken, between 0 and 2.
+    """Nonsmooth Gauss-Seidel: the law at one contact after another. `relaxation` is the fraction of
+    each local change that is taken, between 0 and 2.
     """
 
     relaxation: float = 1.0

@@ -37,11 +37,9 @@ EXACT = 1e-3
 class Penalty(Method):
     """The penalty method. The regularised problem is solved by `auto`.
 
-    Parameters
-    ----------
-    factor : Stiffness of the penalty of each node, in units of one over the mean compliance. The
-        default makes a certificate of about 1e-6.
-    tangential_factor : The same along the surface. None: friction is exact.
+    `factor` is the stiffness of the penalty of each node, in units of one over the mean compliance;
+    the default makes a certificate of about 1e-6. `tangential_factor` is the same along the
+    surface. None: friction is exact.
     """
 
     factor: float = 1e6

@@ -28,16 +28,13 @@ from contactopt.problem import InterfaceProblem
 
 # of the proximal term; where even the largest fails, the loop ends
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6
-Pace = Literal["steady", "gentle", "eager"]
+Pace = Literal["steady", "gentle"]
 
 
 @dataclass(frozen=True)
 class Proximal(Method):
-    """The proximal point method, whose subproblems are solved by Newton's method.
-
-    Parameters
-    ----------
-    alpha : First weight of the proximal term, in units of the mean compliance.
+    """The proximal point method, whose subproblems are solved by Newton's method. `alpha` is the
+    first weight of the proximal term, in units of the mean compliance.
     """
 
     alpha: float = 1e-3
@@ -61,23 +58,12 @@ def proximal_iterates(
     Newton's method left it at. `matrix` is the problem's Q, ready for block systems.
 
     `alpha` is the first weight of the proximal term. It changes slowly at the pace `gentle`, so
-    that few subproblems fail: for problems on which every smaller alpha soon fails. The loop of the
-    pace `eager` ends with the first subproblem that is not solved in few steps.
+    that few subproblems fail: for problems on which every smaller alpha soon fails.
     """
-    fall, rise, easy, most = {
-        "steady": (
-            constants.FALL,
-            constants.RISE,
-            constants.SUBPROBLEM_STEPS,
-            constants.SUBPROBLEM_STEPS,
-        ),
-        "gentle": (
-            constants.GENTLE_FALL,
-            constants.GENTLE_RISE,
-            constants.EASY,
-            constants.SUBPROBLEM_STEPS,
-        ),
-        "eager": (constants.FALL, np.inf, constants.EAGER_STEPS, constants.EAGER_STEPS),
+    most = constants.SUBPROBLEM_STEPS
+    fall, rise, easy = {
+        "steady": (constants.FALL, constants.RISE, most),
+        "gentle": (constants.GENTLE_FALL, constants.GENTLE_RISE, constants.EASY),
     }[pace]
     while alpha < LARGEST_WEIGHT:
         equations = coulomb_equations(problem, point[0], alpha)

@@ -36,12 +36,9 @@ from contactopt.problem.laws.law import Law
 class Tresca(Method):
     """The fixed point of Tresca: convex programs with friction bounds of the solution before.
 
-    Parameters
-    ----------
-    backend : Name of the QP backend in 2D and of the conic backend in 3D. None: proxqp and
-        clarabel.
-    relaxation : Fraction of each change of the friction bounds that is taken, above 0 and at most
-        1.
+    `backend` names the QP backend in 2D and the conic backend in 3D. None: proxqp and clarabel.
+    `relaxation` is the fraction of each change of the friction bounds that is taken, above 0 and at
+    most 1.
     """
 
     backend: str | None = None

@@ -105,9 +105,7 @@ def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
 
 @stated
 def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
-    """min z' S z / 2 - s' lambda   subject to  u_n >= mu |u_t|,  z = u - q - V lambda,  S =
-    Q^-1.
-    """
+    """min z' S z / 2 - s' lambda subject to u_n >= mu |u_t|, z = u - q - V lambda, S = Q^-1."""
     mu = cone_coefficient(problem)
     u, u_n, u_t, lam, z, S, stretch = _all(problem)
     opening = u_n >= cp.multiply(mu, _slip(problem, u_t, facets))

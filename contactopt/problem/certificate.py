@@ -27,8 +27,10 @@ contact i is
 which is zero at all contacts exactly at the solutions. A contact much stiffer than the mean has a
 larger rho_i, because there a small error of the displacement is a large error of the force. The
 certificate is the largest of all e_i, of (|r_t| - mu r_n) / F, and of the relative errors |V_j' r +
-s_j| / max(|s_j|, max_i |V_ij| F) of the balance. Where s_j is not zero F is at most F0 there: a
-body that flies away from all contacts, which makes L and F as large as one likes, balances nothing.
+s_j| / max(|s_j|, max_i |V_ij| F) of the balance. Forces of more than 1e4 F hide errors below their
+own rounding, 2^-52 |r_i| / F, which counts as one more error. Where s_j is not zero F is at most F0
+there: a body that flies away from all contacts, which makes L and F as large as one likes, balances
+nothing.
 
 What a certificate of at most tol promises for Coulomb friction, at every contact:
 
@@ -66,6 +68,8 @@ ACTS = 1e-6  # share of the largest force from which on a contact's displacement
 ROUNDED = 1e-6
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
 UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
+# rounding of r - rho u, over r, and how many times F the forces are from where on it counts
+ROUNDING, UNSEEN = 2.0**-52, 1e4
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
@@ -132,8 +136,10 @@ def natural_map_residual(
     u = d + w
     measure = yardsticks(problem, r, d, w)
     beyond = lengths(r[:, 1:]) - problem.law.bound_along(r)
+    largest = float(lengths(r).max()) / measure.force
     worst = max(
         float(measure.errors(problem.law, r, u).max()),
+        ROUNDING * largest if largest > UNSEEN else 0.0,
         float(beyond.max()) / measure.force,
         balance_residual(problem, r, measure.force),
         0.0 if moved is None else moved.accuracy,
@@ -196,19 +202,9 @@ def _least_displacement(r: np.ndarray, u: np.ndarray) -> float:
 def balance_residual(
     problem: InterfaceProblem, reactions: np.ndarray, force: float | None = None
 ) -> float:
-    """Compute the largest relative error of the balance V' r + s = 0: |V_j' r + s_j| / max(|s_j|,
-    max_i |V_ij| F).
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    reactions : (k, dim) contact forces, normal first [force].
-    force : The yardstick F [force]; by default the largest |r_i|.
-
-    Returns
-    -------
-    The error [-]. It is 0 without a balance, and infinite where a resultant that must vanish has no
-    yardstick.
+    """The largest relative error [-] of the balance V' r + s = 0: |V_j' r + s_j| / max(|s_j|, max_i
+    |V_ij| F), where F [force] is `force`, or the largest |r_i|. It is 0 without a balance, and
+    infinite where a resultant that must vanish has no yardstick F.
     """
     if len(problem.s) == 0:
         return 0.0
@@ -226,22 +222,13 @@ def amplification(
     problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray
 ) -> float:
     """Bound the relative error |dr_i| / F of forces by this many times their certificate, to first
-    order: it is the condition of the solution.
+    order: it is the condition of the solution, and infinite if the forces are not unique.
 
-    The derivative of the natural map and of the balance by r and lambda is M = [[I - D + D rho Q,
-    D rho V], [V', 0]], D that of P. The certificate bounds every block of M (dr, dlambda), so that
+    The derivative of the natural map and of the balance by r and lambda is M = [[I - D + D rho Q, D
+    rho V], [V', 0]], D that of P. The certificate bounds every block of M (dr, dlambda), so that
     the largest sum of norms in a row of blocks of M^-1 bounds dr. Motions that no force feels are
-    left out. It is meant near a solution at which no contact is between two states.
-
-    Parameters
-    ----------
-    problem : with the entries of Q
-    reactions : (k, dim) forces near a solution, normal first [force]
-    multipliers : (p,) displacements of the plates [length]
-
-    Returns
-    -------
-    The factor [-]; inf if the forces are not unique.
+    left out. It is meant near a solution at which no contact is between two states, and needs the
+    entries of Q.
     """
     r, (k, dim) = np.asarray(reactions, dtype=float), problem.q.shape
     if k == 0:
@@ -306,17 +293,9 @@ def siconos_residual(
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """Find the multipliers that fit reactions best, by least squares on the components whose
-    displacement must vanish: u_n where the law says pressed, and u_t where it says sticking.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    reactions : (k, dim) contact forces, normal first [force].
-
-    Returns
-    -------
-    (p,) multipliers lambda; zeros where no displacement must vanish.
+    """The multipliers (p,) that fit reactions best, by least squares on the components whose
+    displacement must vanish: u_n where the law says pressed, and u_t where it says sticking. They
+    are zeros where no displacement must vanish.
     """
     r = np.asarray(reactions, dtype=float)
     rows = np.repeat(problem.law.sticking(r)[:, None], problem.dim, axis=1)

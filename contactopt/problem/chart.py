@@ -74,22 +74,14 @@ class Chart:
         return self.period is not None
 
     def order(self) -> np.ndarray:
-        """Sort the contacts along a contact line; on a surface, along its first direction.
-
-        Returns
-        -------
-        (k,) numbers of the contacts.
-        """
+        """The numbers (k,) of the contacts, sorted along the first direction of the surface."""
         return np.argsort(self.places[0], kind="stable")
 
     def images(self) -> tuple[np.ndarray, np.ndarray]:
-        """List the places of the whole surface, with those of all mirror images.
+        """The places (dim - 1, m) [length] of the whole surface, with those of all mirror images,
+        and the contact (m,) of each.
 
         A contact on a plane of symmetry or on an axis is its own image and stands there once.
-
-        Returns
-        -------
-        Places (dim - 1, m) [length], and the contact (m,) of each.
         """
         x, contact = self.places, np.arange(self.places.shape[1])
         near = ON_PLANE * np.abs(x).max(initial=0.0)
@@ -100,12 +92,8 @@ class Chart:
         return x, contact
 
     def spacing(self) -> np.ndarray:
-        """Compute the distance between the two neighbours of every contact of a line, at an end to
-        the only one.
-
-        Returns
-        -------
-        (k,) distances [length].
+        """The distances (k,) [length] between the two neighbours of every contact of a line, at an
+        end to the only one.
         """
         order = self.order()
         steps, spacing = np.diff(self.places[0, order]), np.empty(len(order))

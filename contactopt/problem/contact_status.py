@@ -24,18 +24,10 @@ class ContactStatus:
 
 
 def contact_status(problem: InterfaceProblem, reactions: np.ndarray) -> ContactStatus:
-    """Tell which contacts are open, which stick and which slip under given reactions.
+    """Which contacts are open, which stick and which slip under given reactions: three masks (k,),
+    of which exactly one is True at each contact.
 
     The law of the problem decides, with its own tolerances (contactopt.problem.laws).
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    reactions : (k, dim) contact forces, normal first [force].
-
-    Returns
-    -------
-    Three masks (k,), of which exactly one is True at each contact.
     """
     touching, stick = problem.law.pressed(reactions), problem.law.sticking(reactions)
     return ContactStatus(~touching, stick, touching & ~stick)

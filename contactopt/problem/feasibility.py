@@ -54,20 +54,12 @@ class Infeasible:
 
 
 def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infeasible | None:
-    """Look for a proof that a problem has no solution.
+    """Look for a proof that a problem has no solution; None says nothing. The linear program takes
+    `time_limit` [s] at most.
 
     Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not
     looked at. A positive definite Q without a plate needs no search: every such problem has a
     solution.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    time_limit : How long the linear program may take [s]; its steps are limited anyway.
-
-    Returns
-    -------
-    The proof. None says nothing: the problem may have a solution or not.
     """
     if (apart := held_apart(problem)) is not None:
         return apart

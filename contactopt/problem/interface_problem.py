@@ -212,41 +212,17 @@ class InterfaceProblem:
         return np.asarray(np.abs(self.V).max(axis=0, initial=0.0))
 
     def altered(self, **values: Any) -> InterfaceProblem:
-        """Make the same problem with other values, which are known to fit and not checked again.
-
-        Parameters
-        ----------
-        values : New values of the fields, by their names.
-
-        Returns
-        -------
-        The problem with these values.
-        """
+        """The same problem with other values of its fields, which must fit and are not checked."""
         other = object.__new__(InterfaceProblem)
         other.__dict__.update({f.name: self.__dict__[f.name] for f in fields(self)} | values)
         return other
 
     def explicit(self) -> InterfaceProblem:
-        """Make the same problem with Q an array.
-
-        Returns
-        -------
-        The problem itself if its Q is an array. InputError if that would be too large.
-        """
+        """The same problem with Q an array. InputError if that would be too large."""
         return self if isinstance(self.Q, np.ndarray) else self.altered(Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
-        """Compute the relative displacements u = Q r + V lambda + q.
-
-        Parameters
-        ----------
-        reactions : (k, dim) contact forces, normal first [force].
-        multipliers : (p,) multipliers lambda.
-
-        Returns
-        -------
-        (k, dim) displacements, normal first [length].
-        """
+        """The relative displacements u = Q r + V lambda + q (k, dim) [length], normal first."""
         return (self.Q @ reactions.ravel() + self.V @ multipliers).reshape(self.q.shape) + self.q
 
 

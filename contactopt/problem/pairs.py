@@ -15,16 +15,8 @@ from contactopt.problem.solution import Solution
 
 
 def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
-    """Take the contacts of one pair of surfaces as a problem, without forces at all others.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    pair : One of its pairs, with k_i contacts.
-
-    Returns
-    -------
-    The problem of the k_i contacts. Where there is one pair only, it is the problem itself.
+    """The contacts (k_i) of one pair of surfaces as a problem, without forces at all others. Where
+    there is one pair only, it is the problem itself.
     """
     if len(problem.pairs) == 1:
         return problem
@@ -46,22 +38,12 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
 def alone(
     problem: InterfaceProblem, solution: Solution, pair: Pair
 ) -> tuple[InterfaceProblem, Solution]:
-    """Take one pair of surfaces alone, with the forces of all other pairs as they are in the
-    solution.
+    """One pair of surfaces alone, with the forces of all other pairs as they are in the solution:
+    its problem, and the solution with its reactions (k_i, dim).
 
     The displacements of the pair are the same functions of its own forces, and the loads are those
     that the solution's forces on the pair balance. A solution of the whole problem therefore gives
     one of this problem. Where there is one pair only, both are returned as they are.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-    solution : A solution of it.
-    pair : One of its pairs, with k_i contacts.
-
-    Returns
-    -------
-    The problem of the k_i contacts, and the solution with their reactions (k_i, dim).
     """
     if len(problem.pairs) == 1:
         return problem, solution

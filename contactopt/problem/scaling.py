@@ -33,16 +33,7 @@ class Scales:
     def to_physical(
         self, reactions: np.ndarray, multipliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Take dimensionless reactions and multipliers to the units of the problem.
-
-        Parameters
-        ----------
-        reactions, multipliers : (k, dim) and (p,) of the dimensionless problem.
-
-        Returns
-        -------
-        Both in the units of the problem.
-        """
+        """Dimensionless reactions (k, dim) and multipliers (p,), in the units of the problem."""
         if self.stretch is not None:
             tangential = np.einsum("kab,kb->ka", self.stretch, reactions[:, 1:])
             reactions = np.column_stack([reactions[:, 0], tangential])
@@ -51,16 +42,7 @@ class Scales:
     def to_dimensionless(
         self, reactions: np.ndarray, multipliers: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Take reactions and multipliers to the dimensionless problem, as `to_physical` back.
-
-        Parameters
-        ----------
-        reactions, multipliers : (k, dim) [force] and (p,) in the units of the problem.
-
-        Returns
-        -------
-        Both without units.
-        """
+        """Reactions (k, dim) and multipliers (p,) without units, the inverse of `to_physical`."""
         if self.stretch is not None:
             tangential = np.linalg.solve(self.stretch, reactions[:, 1:, None])[:, :, 0]
             reactions = np.column_stack([reactions[:, 0], tangential])
@@ -68,17 +50,10 @@ class Scales:
 
 
 def isotropic(problem: InterfaceProblem) -> InterfaceProblem:
-    """Write a problem in variables in which friction is the same in all directions.
+    """The problem in variables in which friction is the same in all directions; the problem itself
+    where it is so already.
 
     With S from `Law.stretch`, r = S y and v = S u give v = S Q S y + S V lambda + S q.
-
-    Parameters
-    ----------
-    problem : The interface problem.
-
-    Returns
-    -------
-    The problem in y and v; the problem itself where its law is the same in all directions.
     """
     stretch = problem.law.stretch(problem.dim)
     if stretch is None:
@@ -97,21 +72,13 @@ def isotropic(problem: InterfaceProblem) -> InterfaceProblem:
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the
-    columns of V have length one.
+    columns of V have length one. The Scales take its reactions and multipliers back.
 
     The force scale is the mean force that the balance asks of a node or, without a balance, the
     force that removes the root-mean-square overlap at one node. Gaps, however wide, do not count.
     Every change of units of the input gives the same numbers here. A component that cannot move (on
     a symmetry plane, say) carries no force that matters: a unit compliance there makes that force
     zero instead of undetermined.
-
-    Parameters
-    ----------
-    problem : The interface problem in its own units.
-
-    Returns
-    -------
-    The dimensionless problem, and the Scales that take its reactions and multipliers back.
     """
     scales, held = scales_of(problem), immovable(problem)
     compliance, columns = scales.length / scales.force, scales.length / scales.multipliers

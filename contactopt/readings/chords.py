@@ -69,9 +69,7 @@ def chord_remarks(reduction: Reduction, solution: Solution) -> list[str]:
 
 
 def chord_heights(reduction: Reduction) -> np.ndarray:
-    """By how much the gap of the curves is larger than that of the facets at each contact, (k,)
-    [length].
-    """
+    """By how much the curves' gap exceeds that of the facets at each contact, (k,) [length]."""
     scene, known, found = reduction.scene, dict[str, Any](), []
 
     def way(name: str, surface: str | None) -> Way | None:
@@ -168,9 +166,7 @@ def _heights(coupling: Coupling, ways: list[Way | None]) -> np.ndarray:
 
 
 def pressure_changes(reduction: Reduction, solution: Solution, d: np.ndarray) -> np.ndarray:
-    """By how much the pressure would change, (k,) [stress], if the gap were larger by d (k,)
-    [length].
-    """
+    """By how much the pressure changes, (k,) [stress], if the gap grows by d (k,) [length]."""
     problem = reduction.problem
     u = problem.displacements(solution.reactions, solution.multipliers)[:, 0]
     touching = problem.law.pressed(solution.reactions)

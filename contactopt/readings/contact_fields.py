@@ -30,7 +30,8 @@ class ContactFields:
 
     Forces are those on the upper body, vectors those of space.
 
-    points, cells  (dim, k) positions; (v, c) contacts at the corners of the cells
+    points, cells  (dim, k) positions; (v, c) contacts at the corners of the cells, in space around
+                   the normal
     areas          (k,) nodal areas [length^2]
     pressure       (k,) normal force over area [stress];  traction  (dim, k) whole contact force
                    over area [stress]
@@ -61,12 +62,8 @@ class ContactFields:
         }
 
     def rows(self, axes: Sequence[str], units: tuple[str, str]) -> tuple[list[str], np.ndarray]:
-        """The head of a table, with units, and one row per contact; status as in `status`.
-
-        Parameters
-        ----------
-        axes : Names of the coordinates.
-        units : Of length and stress.
+        """The head of a table with the units of length and stress, and one row per contact; status
+        as in `status`.
         """
         length, stress = units
         head = [*(f"{axis} [{length}]" for axis in axes), f"area [{length}^2]"]
@@ -88,6 +85,19 @@ def _tall(x: np.ndarray) -> np.ndarray:
     return np.pad(x, ((0, 3 - len(x)), (0, 0))).T
 
 
+def _along(normals: np.ndarray, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """The cells (v, c), in space each turned so that its corners go around the normals (k, dim) of
+    the contacts in the positive sense.
+    """
+    if len(points) < 3:
+        return cells
+    x = points[:, cells]
+    area = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0], axis=0)
+    area += np.cross(x[:, 2] - x[:, 0], x[:, -1] - x[:, 0], axis=0)  # the other half of a quad
+    against = np.einsum("ic,vci->c", area, normals[cells]) < 0
+    return np.where(against, cells[::-1], cells)
+
+
 def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:
     """The ContactFields of each pair, in the order of the pairs."""
     problem, r = reduction.problem, solution.reactions
@@ -104,7 +114,7 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
             ContactFields(
                 pair.name,
                 coupling.positions,
-                coupling.cells,
+                _along(coupling.frames[:, 0], coupling.positions, coupling.cells),
                 areas[own],
                 nodal_pressure(problem, solution)[own],
                 traction[:, own],

@@ -314,9 +314,7 @@ def width_reading(reduction: Reduction, solution: Solution) -> Reading:
 
 
 def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]:
-    """The contacts on both sides of the edge of a zone, as one peak; none where the zone has no
-    edge.
-    """
+    """The contacts on both sides of a zone's edge, as one peak; none where the zone has no edge."""
     across = inside[neighbours(problem)] != inside[:, None]
     edge = np.flatnonzero(np.any(across, axis=1))
     return (Peak(0.0, 0.0, problem.coordinates[:, edge[0]], 0.0, edge),) if len(edge) else ()

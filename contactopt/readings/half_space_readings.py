@@ -44,9 +44,7 @@ class SurfaceContact:
 
 
 def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceContact:
-    """The numbers that describe one solved state: areas, pressures, the mean gap and the work of
-    friction.
-    """
+    """The numbers that describe a solved state: areas, pressures, mean gap and friction's work."""
     r, areas = solution.reactions, problem.areas
     status, u = contact_status(problem, r), problem.displacements(r, solution.multipliers)
     area, whole = float(areas[status.touching].sum()), float(areas.sum())

@@ -169,16 +169,8 @@ class Patch:
 
 
 def least(values: np.ndarray, count: int) -> np.ndarray:
-    """Find the least of many values without sorting all of them.
-
-    Parameters
-    ----------
-    values : (k,) numbers.
-    count : How many are wanted.
-
-    Returns
-    -------
-    (count,) their places in `values`, the least first, and the first ones of equal values.
+    """(count,) the places of the least of many values, the least first, and the first ones of equal
+    values. Not all of them are sorted.
     """
     if count < len(values):
         some = np.flatnonzero(values <= np.partition(values, count - 1)[count - 1])

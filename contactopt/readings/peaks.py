@@ -18,7 +18,7 @@ from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import joined
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.chart import ON_PLANE, Chart
-from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
+from contactopt.readings.constants import EQUAL, FITTED, MOST_PEAKS, NEIGHBOURS
 from contactopt.readings.patches import least
 
 # Of the value, times the share of the fitted contacts on a surface that lie beside open ones, which
@@ -114,10 +114,12 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
 
 def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:
     """Numbers of the places whose size (k,) is the largest one (k,) around them, those of the
-    largest size first, MOST_PEAKS at most.
+    largest size first, MOST_PEAKS at most. Rounding, and with it the unit of length, does not
+    choose among equal ones.
     """
-    chosen = np.flatnonzero(sizes >= largest)
-    return chosen[np.argsort(-sizes[chosen], kind="stable")[:MOST_PEAKS]]
+    chosen = np.flatnonzero(sizes >= (1 - EQUAL) * largest)
+    order = np.round(sizes[chosen] / (EQUAL * sizes.max(initial=0.0) or 1.0))
+    return chosen[np.argsort(-order, kind="stable")[:MOST_PEAKS]]
 
 
 def largest_around(problem: InterfaceProblem, sizes: np.ndarray) -> np.ndarray:

@@ -126,9 +126,7 @@ def place_of(name: Any, scene: Scene) -> Place | None:
 
 
 def _check_there(part: Any, region: Region, scene: Scene) -> None:
-    """InputError for a boundary that the first mesh of a body does not have, and for a point far
-    outside it.
-    """
+    """InputError for a boundary that the body's first mesh lacks, and for a point far outside."""
     from contactopt.meshes.cells import straight
 
     mesh = part.build_mesh(scene.elements, scene.zone)
@@ -252,9 +250,7 @@ def place_seeds(place: Place, state: State) -> Seeds:
 
 
 def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
-    """(k, dim) what the force at each contact contributes to the pressure at a place
-    [1 / length^2].
-    """
+    """(k, dim) what the force at each contact contributes to a place's pressure [1 / length^2]."""
     problem = reduction.problem
     pairs = {pair.name: pair for pair in problem.pairs}
     own = np.zeros(problem.contacts, dtype=bool)

@@ -34,14 +34,18 @@ def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
     """Loads on facets that may touch."""
     notes = []
     for load in part.loads:
-        if not isinstance(load, Traction) or not np.any(load.value):
+        if isinstance(load, Traction) and np.any(load.value):
+            what = "traction"
+        elif isinstance(load, Plate) and any(load.force.values()):
+            what = "plate"
+        else:
             continue
         loaded = np.asarray(part.mesh.boundaries[load.boundary])
         for name in scene.surfaces_of(part):
             shared = len(np.intersect1d(loaded, part.mesh.boundaries[name]))
             if shared:
                 notes.append(
-                    f"the traction on {load.boundary!r} of body '{part.name}' acts on {shared}"
+                    f"the {what} on {load.boundary!r} of body '{part.name}' acts on {shared}"
                     f" facets of {name!r}, which may touch: it acts beside the contact forces, and"
                     " where the surfaces are open; is another boundary meant?"
                 )

@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import force_unit
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
@@ -89,6 +90,17 @@ def find_quantity(name: Any, scene: Scene) -> Quantity:
         named = ", ".join(own for own, (form, _) in ROWS.items() if form == "[:PAIR]")
         raise InputError(f"the {kind} belongs to the whole scene; of one pair ask for {named}.")
     return make(name, rest, scene)
+
+
+def unit_of(name: str, units: tuple[str, str]) -> str:
+    """The unit of a quantity by its name, for units of length and stress."""
+    length, stress = units
+    force = force_unit(units)
+    work = f"{force} {length}"
+    known = {"approach": length, "shift": length, "width": length, "stick": ""}
+    known |= {"normal_force": force, "shear_force": force, "resultant": force}
+    known |= {"energy": work, "friction_work": work}
+    return known.get(name.partition(":")[0], stress)
 
 
 def quantity_of_states(name: Any, states: Sequence[Scene]) -> Quantity:

@@ -37,9 +37,7 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
 
 
 def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on contacts that touch where the other surface ends and covers a part of their
-    faces.
-    """
+    """Sentences on contacts where the other surface ends and covers a part of their faces."""
     found = []
     for (view, own), coupling in zip(views(reduction, solution), reduction.couplings):
         touches = contact_status(view.problem, own.reactions).touching

@@ -12,6 +12,7 @@ import numpy as np
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
+from contactopt.problem.cones import lengths
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_zone, is_level, stick_width
 from contactopt.readings.peaks import nodal_pressure
@@ -24,9 +25,7 @@ ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and
 
 @dataclass(frozen=True, eq=False)
 class Resultant:
-    """A force (dim,) and its moment about the origin, in 2D (1,) about the third axis, in space
-    (3,).
-    """
+    """A force (dim,) and its moment about the origin, (1,) about the third axis in 2D or (3,)."""
 
     force: np.ndarray
     moment: np.ndarray
@@ -174,6 +173,7 @@ def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     """The tables of a summary. 'pairs': for each pair of surfaces its resultant, normal force
+    [force], the sums of the sizes of its friction forces and of their bounds
     [force], largest pressure [stress], area [length^2], half-widths [length], coupling with its
     reason, and counts of contacts. 'holders': the resultant of each support and plate.
     """
@@ -186,6 +186,8 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
         level = is_level(problem, view.coupling.frames, r)
         pairs[name] = found.table | {
             "normal_force": float(r[:, 0].sum()),
+            "friction_force": float(lengths(r[:, 1:]).sum()),
+            "friction_bound": float(problem.law.bound_along(r).sum()),
             "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
             "contact_area": contact_area(view.scene, problem, r),
             "contact_half_width": zone[0] if level else None,

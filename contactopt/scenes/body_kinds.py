@@ -140,16 +140,7 @@ class Part:
         return not callable(self.mesh)
 
     def curve_of(self, boundary: str) -> Curve | None:
-        """Find the function that puts points of a contact boundary on its surface.
-
-        Parameters
-        ----------
-        boundary : its name
-
-        Returns
-        -------
-        Curve : a function of points (dim, m) to points (dim, m) [length], if there is one
-        """
+        """The function, if any, that puts points (dim, m) [length] of a boundary on its surface."""
         if callable(self.curve):
             found = self.curve if boundary == self.contact else None
         else:
@@ -160,16 +151,9 @@ class Part:
         return Curve(found, True, label, given=True)
 
     def build_mesh(self, elements: int, zone: float | None) -> Any:
-        """Make the mesh of the body.
-
-        Parameters
-        ----------
-        elements : number across the contact half-width
-        zone : half-width of contact that the mesh resolves [length]; None: the scene's first guess
-
-        Returns
-        -------
-        Mesh : of scikit-fem; the given one, if the part has a mesh and no function
+        """The mesh of the body, with `elements` across the half-width `zone` [length] of the
+        contact; None: the scene's first guess. It is the given one if the part has a mesh and no
+        function.
         """
         return self.mesh(elements, zone) if callable(self.mesh) else self.mesh
 
@@ -275,21 +259,11 @@ class HalfSpace:
         return not callable(self.points)
 
     def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:
-        """Compute the places of the points along each of the axes.
+        """The places (n_i,) [length] of the points along each of the axes. InputError unless they
+        are evenly spaced and growing, at least four along each axis.
 
-        Parameters
-        ----------
-        elements : number across the contact half-width, for points that are given by a function
-        zone : half-width that they resolve [length]
-        axes : number of axes
-
-        Returns
-        -------
-        tuple of ndarray : places (n_i,) along each axis [length]
-
-        Raises
-        ------
-        InputError : unless they are evenly spaced and growing, at least four along each axis
+        Points that are given by a function depend on `elements` across the contact half-width, and
+        on the half-width `zone` [length] that they resolve.
         """
         given = self.points(elements, zone) if callable(self.points) else self.points
         if not isinstance(given, (tuple, list, np.ndarray)) or len(given) == 0:

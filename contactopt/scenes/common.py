@@ -99,16 +99,8 @@ def circle(radius: float) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def with_elements(scene: Scene, degree: int | None = None, simplices: bool = False) -> Scene:
-    """Give a scene other elements.
-
-    Parameters
-    ----------
-    scene, degree : the scene, and the degree of its displacement, 1 or 2; None: the scene's own
-    simplices : whether quadrilaterals and hexahedra are cut into triangles and tetrahedra
-
-    Returns
-    -------
-    Scene : with these elements; the given one stays as it is
+    """The scene with displacements of another degree, 1 or 2, unless that is None. With `simplices`
+    its quadrilaterals and hexahedra are cut into triangles and tetrahedra.
     """
 
     def cut(part: Any) -> Any:

@@ -51,9 +51,7 @@ def library() -> dict[str, Named]:
 
 
 def material_of(body: Table, own: dict[str, Named], stress: str) -> Material:
-    """The material of a body's table: E and nu, or the name of one; E in the scene's unit of
-    stress.
-    """
+    """The material of a body's table: E and nu, or a name; E in the scene's unit of stress."""
     if not isinstance(body.data.get("material"), str):
         given = body.table("material")
         if given is None:

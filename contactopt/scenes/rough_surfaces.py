@@ -23,33 +23,18 @@ def self_affine(
     slope: float = 0.1,
     seed: int = 0,
 ) -> np.ndarray:
-    """Draw heights of a periodic self-affine rough surface from a seed.
+    """Draw heights (nx, ny) [length] of a periodic self-affine rough surface from a seed.
+    InputError on cut-offs that are out of order or that the points do not resolve.
 
-    The heights are Gaussian. Their power spectrum falls with the wave number k as k^(-2 (1 +
-    hurst)) between the wavelengths `roll_off` and `shortest`, is constant from `longest` to
-    `roll_off`, and zero beyond. The same seed gives the same waves on every grid that resolves
+    The heights are Gaussian, with Hurst's exponent from 0 to 1, and `slope` is the root mean square
+    of their gradient. Their power spectrum falls with the wave number k as k^(-2 (1 + hurst))
+    between the wavelengths `roll_off` and `shortest`, is constant from `longest` to `roll_off`, and
+    zero beyond. By default `longest` and `roll_off` are the shorter of the lengths, and `shortest`
+    is eight spacings of the points. The same seed gives the same waves on every grid that resolves
     `shortest`.
 
     Source: Persson et al. (2005), On the nature of surface roughness with application to contact
     mechanics, J. Phys.: Condens. Matter 17, R1-R62.
-
-    Parameters
-    ----------
-    points, lengths : number of points, and length of the period, along x and y [length]
-    hurst : Hurst's exponent, from 0 to 1 [-]
-    longest, shortest : cut-off wavelengths [length]; by default the shorter of the lengths, and
-        eight spacings of the points
-    roll_off : wavelength above which the spectrum is constant [length]; by default `longest`
-    slope : root mean square of the gradient of the heights [-]
-    seed : of the random numbers
-
-    Returns
-    -------
-    ndarray : (nx, ny) heights [length]
-
-    Raises
-    ------
-    InputError : on cut-offs that are out of order or that the points do not resolve
     """
     for name, pair in (("points", points), ("lengths", lengths)):
         if np.shape(pair) != (2,):

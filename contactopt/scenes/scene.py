@@ -120,6 +120,12 @@ class Scene:
         for part in self.parts:
             part.check_in(self.kind)
 
+    def _repr_html_(self) -> str:
+        # the one look upwards of this room, taken only where a notebook shows a scene
+        from contactopt.figures.notebook import scene_page
+
+        return scene_page(self)
+
     def _wrong(self, why: str) -> InputError:
         return InputError(f"scene '{self.name}': {why}")
 
@@ -153,44 +159,17 @@ class Scene:
         return (Contact(self.upper.name, self.lower.name, self.mu, self.law),)
 
     def with_parts(self, change: Callable[[Any], Any]) -> Scene:
-        """Change the bodies of a scene.
-
-        Parameters
-        ----------
-        change : a function of a body that returns another one
-
-        Returns
-        -------
-        Scene : with the bodies that it returned
-        """
+        """The scene with the bodies that a function makes of its bodies."""
         if self.upper is None or self.lower is None:
             return replace(self, bodies=tuple(change(part) for part in self.bodies))
         return replace(self, upper=change(self.upper), lower=change(self.lower))
 
     def surfaces_of(self, part: Any) -> tuple[str, ...]:
-        """Name the boundaries of a part that contacts use.
-
-        Parameters
-        ----------
-        part : one of the bodies
-
-        Returns
-        -------
-        tuple of str : the names, each once, in the order of the pairs
-        """
+        """The boundaries of a part that contacts use, each once, in the order of the pairs."""
         return tuple(dict.fromkeys(name for name, _ in self._uses(part))) or (part.contact,)
 
     def laws_of(self, part: Any, boundary: str) -> set[str]:
-        """Name the contact laws of the pairs that use a boundary.
-
-        Parameters
-        ----------
-        part, boundary : one of the bodies, and the name of one of its boundaries
-
-        Returns
-        -------
-        set of str : their names; none for a boundary that no pair uses
-        """
+        """The contact laws of the pairs that use a boundary; none where no pair uses it."""
         return {pair.law for name, pair in self._uses(part) if name == boundary}
 
     def _uses(self, part: Any) -> list[tuple[str, Contact]]:

@@ -198,8 +198,9 @@ def _found(top: Table, parts: list[Any], reading: Reading) -> list[Table]:
         within = f"face each other within {reach:.3g} {reading.length}"
         if not reading.found:
             raise top.fail(
-                f"no boundaries of two bodies {within}; give a larger distance, or name the"
-                " boundaries that may touch.",
+                "no boundaries of two bodies, but for those with supports or loads and whole"
+                f" surfaces, {within}; give a larger distance, or name the boundaries that may"
+                " touch.",
                 "contacts",
             )
         toml = as_toml(reading.found, top.data["mu"], reading.length)

@@ -66,17 +66,7 @@ def follow(
 def follow_path(
     scenes: Iterable[Scene], elements: int | None, zone: float | None, options: Options
 ) -> PathResult:
-    """Solve a load path with options for all states.
-
-    Parameters
-    ----------
-    scenes, elements, zone : as for follow(), and so are the errors
-    options : how each state is solved
-
-    Returns
-    -------
-    PathResult : the states with their solutions, in their order
-    """
+    """Solve a load path with the same options for all states; the errors are those of follow()."""
     total = f" of {len(scenes)}" if isinstance(scenes, Sized) else ""
     states: list[State] = []
     solved: Solved | None = None
@@ -126,9 +116,7 @@ def _next_state(
 
 
 def _ended(now: Solved, states: list[State], named: str) -> Solution:
-    """The last iterate of a state that was not solved, with a message that says where the path
-    ends.
-    """
+    """The last iterate of a state that was not solved; its message says where the path ends."""
     solution, before = now.solution, f"state {len(states)}"
     slid = sliding(now.reduction.problem, solution, states[-1].solution)
     if slid is None:

@@ -131,15 +131,8 @@ class PathResult:
         return [*(state.solution for state in self.states), *failed]
 
     def problem(self, step: int) -> InterfaceProblem:
-        """Make the static problem of one step, which its solution is certified against.
-
-        Parameters
-        ----------
-        step : The number of the state, from 0 on.
-
-        Returns
-        -------
-        The problem with the gaps and resultants of that state.
+        """The static problem of one step, with its gaps and resultants, which its solution is
+        certified against. Steps count from 0.
         """
         return replace(self.reduction.problem, q=self.states[step].q, s=self.states[step].s)
 
@@ -172,15 +165,8 @@ class PathResult:
         return history
 
     def fields(self, step: int) -> tuple[Fields, ...]:
-        """Compute displacement and stress of the elastic bodies at a state.
-
-        Parameters
-        ----------
-        step : The number of the state, from 0 on.
-
-        Returns
-        -------
-        Those of each elastic body; none where the state keeps no displacements.
+        """Displacement and stress of each elastic body at a state; none where it keeps no
+        displacements.
         """
         pairs = zip(self.reduction.bodies, self.states[step].bodies)
         return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)
@@ -188,10 +174,6 @@ class PathResult:
     def write_history(self, file: Path) -> None:
         """Write the history as comma-separated values, one row per state, with the names of the
         steps of the path in its last column.
-
-        Parameters
-        ----------
-        file : The file.
         """
         with open(file, "w", newline="") as opened:
             rows = csv.writer(opened)
@@ -202,16 +184,8 @@ class PathResult:
             rows.writerows(zip(*history.values()))
 
     def at(self, step: int) -> tuple[Reduction, Solution]:
-        """Find the problem and the solution of a state.
-
-        Parameters
-        ----------
-        step : The number of the state, from 0 on.
-
-        Returns
-        -------
-        The reduction with the problem of the step, whose bodies carry the loads of the last state,
-        and the solution.
+        """The reduction with the problem of a step, whose bodies carry the loads of the last state,
+        and the solution of the step.
         """
         state = self.states[step]
         reduction = replace(self.reduction, problem=self.problem(step), scene=state.scene)
@@ -219,14 +193,10 @@ class PathResult:
 
     def write(self, out: str | Path) -> None:
         """Write history.csv, and path.npz with coordinates (d, k), areas (k,), reactions and
-        displacements (n, k, dim).
+        displacements (n, k, dim). The folder is made if it does not exist.
 
-        It also has the bounds of the friction forces (n, k), the status (n, k): 0 open, 1 stick, 2
-        slip, and the contact frames (k, dim, dim), one direction per row, normal first.
-
-        Parameters
-        ----------
-        out : The folder, which is made if it does not exist.
+        path.npz also has the bounds of the friction forces (n, k), the status (n, k): 0 open, 1
+        stick, 2 slip, and the contact frames (k, dim, dim), one direction per row, normal first.
         """
         problem = self.reduction.problem
         forces = [state.solution.reactions for state in self.states]

@@ -14,7 +14,7 @@ from pathlib import Path
 from contactopt.linear.operators import InterfaceOperator
 from contactopt.problem import InterfaceProblem
 
-PATIENCE = 5.0  # seconds of a solve about which nothing is said
+PATIENCE = 2.0  # seconds of a solve about which nothing is said
 
 
 def progress_lines(

@@ -16,7 +16,8 @@ NEAR = 0.9  # share of what friction bears from which on a state without a stick
 
 class Sliding(NamedTuple):
     """A free motion along which friction gives way: its name, the load along it, and the largest
-    load that friction bears under the normal forces [force].
+    load that friction bears under the normal forces of the state before [force], nan if it bears
+    the load under those.
     """
 
     motion: str
@@ -49,7 +50,8 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
         worst = int(np.argmax(load - most))
         if load[worst] > (NEAR if slips else 1.0) * most[worst] > 0:
             name = problem.motions[worst] if problem.motions else f"motion {worst + 1}"
-            found = found or Sliding(name, float(load[worst]), float(most[worst]))
+            held = float(most[worst]) if own is before else np.nan
+            found = found or Sliding(name, float(load[worst]), held)
     return found
 
 
@@ -61,8 +63,6 @@ def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
     load = f"the load along {found.motion} is {found.load:.6g} {force}"
     held = "more than friction holds"
     if before:
-        held = (
-            f"and it held up to about {most:.6g} {force} in {before}; numbers and files are those"
-            f" of {before}"
-        )
+        held = held if np.isnan(most) else f"and it held up to about {most:.6g} {force} in {before}"
+        held += f"; numbers and files are those of {before}"
     return f"{state} slides, every touching contact slips: {load}, {held}"

@@ -40,21 +40,16 @@ STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselv
 
 @dataclass(frozen=True)
 class Options:
-    """How scenes are solved, whatever loop goes around it.
+    """How scenes are solved, whatever loop goes around it. The fields not named here are arguments
+    of contactopt.reduce and contactopt.solve.
 
-    Attributes
-    ----------
-    Q : form of the interface operator, as for contactopt.reduce
-    solver : of the bodies' linear systems, as for contactopt.reduce
-    method : as for contactopt.solve
-    tol : bound on the natural-map residual; above the usual one the last step comes no further, and
-        what is read off the bodies is as accurate
-    settings : further arguments of contactopt.solve: limits, and settings of a method that is given
-        by its name
-    note : receives one short sentence before every step that takes time, and in long solves one
-        after each iteration
-    restart : keeps what is found on the way, and may give a start
-    until : when solves end that are not done yet, on the clock time.perf_counter() [s]
+    tol        above the usual one the last step comes no further, and what is read off the bodies
+               is as accurate
+    settings   further arguments of contactopt.solve
+    note       receives one short sentence before every step that takes time, and in long solves
+               one after each iteration
+    restart    keeps what is found on the way, and may give a start
+    until      when solves end that are not done yet, on the clock time.perf_counter() [s]
     """
 
     Q: str = "auto"
@@ -202,9 +197,7 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
 def _solved(
     reduction: Reduction, start: Solution | None, options: Options, earlier: Mapping[str, float]
 ) -> Solved:
-    """The solution of a reduced scene, with the seconds of the reduction, of the solve and of what
-    came earlier.
-    """
+    """The solution of a reduced scene, with the seconds of all that came earlier."""
     lines = progress_lines(options.note, reduction.problem, options.tol)
     if options.restart is not None:
         options.restart.begin(reduction)

@@ -23,26 +23,13 @@ def solve_zone(
     start: Solved | None = None,
 ) -> Solved:
     """Solve a scene; where it has a contact zone, remesh until its edge is a node of the mesh.
+    InputError if fewer than two nodes are in contact.
 
-    Each round starts from the one before, and reads the new edge from the reactions. The loop ends
-    when two zones agree to AGREE of an element, when a solve fails, or after LOOPS rounds. A scene
-    without a zone, or with several pairs of surfaces, is solved once.
-
-    Parameters
-    ----------
-    scene : what to solve; `scene.zone` is the first guess of its half-width [length]
-    elements : across the contact half-width; the scene's own number by default
-    options : how each round is solved
-    start : the scene solved on another mesh; its last zone replaces the first guess
-
-    Returns
-    -------
-    Solved : the last round; `zones` are those tried, the last of them read from this solution;
-        `solution.seconds` are summed over the rounds
-
-    Raises
-    ------
-    InputError : if fewer than two nodes are in contact, and as solve_scene()
+    Each round starts from the one before, the first from `start` (the scene solved on another mesh)
+    or from the guess `scene.zone`, and reads the new edge from the reactions. The loop ends when
+    two zones agree to AGREE of an element, when a solve fails, or after LOOPS rounds;
+    `solution.seconds` are summed over the rounds. A scene without a zone, or with several pairs of
+    surfaces, is solved once.
     """
     elements = scene.elements if elements is None else elements
     if scene.zone is None or len(scene.pairs) > 1:

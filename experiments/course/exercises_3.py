@@ -86,7 +86,6 @@ GRADED = {
         (a / np.sqrt(2), "The parabola is f x^2 / (2 T): a factor of two is missing."),
         (0.5 - a, "This is the distance from the middle. Give that from the end."),
         (2 * a, "This is the length that hangs at both ends together."),
-        (0.07 / f, "A height over a weight per length is no length: look at the units."),
     ),
     "3.2": (
         None,
@@ -117,12 +116,6 @@ GRADED = {
         (lambda: sweep(sweeps=2), "This is the result of two sweeps."),
         (lambda: sweep()[::-1], "order"),
     ),
-    "3.6": (
-        None,
-        (f / 0.0003 / 40, "This is the spring of one node [N/mm]. Asked is that per length."),
-        (0.0003 / f, "You divided the wrong way: a stiffness is a load over a depth."),
-        (0.25 / 0.0003, "The height d does not push; the weight f does."),
-    ),
     "3.7": (
         lambda: Numbers(
             float(carried().sum()),
@@ -134,18 +127,6 @@ GRADED = {
         (f, "This is the whole weight. The ends carry a part of it."),
         (lambda: carried().mean(), "The floor rises below all nodes: add their forces."),
         (lambda: carried().max(), "This is the force on one node. Add all of them."),
-    ),
-    "3.8": (
-        None,
-        (1e6, "It grows like N^2; the factor is missing."),
-        (4e6, "The largest eigenvalue is about 4, the smallest is not 1 / N^2."),
-        (1 / np.tan(np.pi / 2000), "This is its square root."),
-    ),
-    "3.9": (
-        None,
-        (1.9 / 0.013, "This is the condition number of Q_c. A penalty adds to all eigenvalues."),
-        ((1.9 + 24) / (0.013 + 24), "Here the compliance of the spring counts: add 1 / k_p."),
-        ((1.9 + 24) / 0.013, "The spring belongs to every node: add to both eigenvalues."),
     ),
     "3.10": (
         lambda: Numbers(

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from experiments.course.feedback import Right, as_numbers, draw
+from experiments.course.mistakes import value
 from experiments.course.quantities import Numbers, by_hand
 from experiments.course.verdict import CLOSE, Verdict
 
@@ -80,9 +81,17 @@ def exercises(chapter: int) -> dict[str, Exercise]:
     graded = import_module(f"experiments.course.exercises_{chapter}").GRADED
     found = {}
     for number, text in texts.items():
-        right, *mistakes = graded[number]
-        found[number] = Exercise(number, right, tuple(mistakes), **text)
+        right, *computed = graded.get(number, (None,))
+        told = [(wrong_value(one, text), words) for one, words in text.pop("mistakes", ())]
+        found[number] = Exercise(number, right, (*told, *computed), **text)
     return found
+
+
+def wrong_value(formula: Any, text: dict[str, Any]) -> Any:
+    """A wrong answer from its formula, or from one formula for each number of the answer."""
+    if isinstance(formula, str):
+        return value(formula, text.get("given", {}))
+    return tuple(wrong_value(one, text) for one in formula)
 
 
 def exercise(number: str) -> Exercise:
@@ -100,9 +109,9 @@ def right_answer(number: str) -> Right:
     task = exercise(number)
     if task.right is None:
         return by_hand(task.formulas, task.given, task.close, task.least, task.most)
-    value = task.right()
-    plain = isinstance(value, (int, float, tuple, list, np.ndarray))
-    return Numbers(value) if plain else value
+    found = task.right()
+    plain = isinstance(found, (int, float, tuple, list, np.ndarray))
+    return Numbers(found) if plain else found
 
 
 @cache

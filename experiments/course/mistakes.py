@@ -16,7 +16,19 @@ import numpy as np
 
 NAMES = {
     name: getattr(np, name)
-    for name in ("sqrt", "exp", "log", "log10", "sin", "cos", "tan", "arccos", "ceil", "floor")
+    for name in (
+        "sqrt",
+        "exp",
+        "log",
+        "log10",
+        "sin",
+        "cos",
+        "tan",
+        "arccos",
+        "ceil",
+        "floor",
+        "hypot",
+    )
 } | {"abs": abs, "pi": np.pi}
 OTHERS = {
     "cos": "sin",
@@ -26,6 +38,8 @@ OTHERS = {
     "arccos": "cos",
     "tan": "sin",
 }
+# pairs of changes and products of powers are tried up to here; more would match by chance
+MOST_CHANGES, MOST_QUANTITIES, EXACT = 60, 7, 1e-6
 EXPONENTS = (0.5, 1 / 3, 2 / 3, 2.0, 3.0)
 # what a whole answer may be multiplied by, and what this means
 FACTORS = (
@@ -94,6 +108,9 @@ def changed(node: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr,
             for other, words in changed(argument, given):
                 yield ast.Call(node.func, [other], []), words
         case ast.Name(name) if name in given:
+            squared = ast.BinOp(node, ast.Pow(), ast.Constant(2.0))
+            yield squared, f"`{name}` is squared"
+            yield ast.BinOp(node, ast.Pow(), ast.Constant(0.5)), f"`{name}` is under a square root"
             for other in given:
                 if given[other] != given[name]:
                     told = f"`{other}` takes the place of `{name}`"
@@ -127,21 +144,52 @@ def _changed_operation(
 
 
 @cache
-def combinations(given: tuple[tuple[str, float], ...]) -> tuple[tuple[float, str], ...]:
-    """Sums, differences, products and quotients of the given quantities, which are no formula of
-    the exercise: two of them, or three in a row.
+def two_mistakes(
+    formula: str, given: tuple[tuple[str, float], ...]
+) -> tuple[tuple[float, str], ...]:
+    """Numbers that two mistakes give; of long formulas there are too many."""
+    quantities, found = dict(given), []
+    once = list(changed(ast.parse(formula, mode="eval").body, quantities))
+    for node, first in once if len(once) <= MOST_CHANGES else ():
+        for other, second in changed(node, quantities):
+            try:
+                number = _value(other, quantities)
+            except (ArithmeticError, ValueError, TypeError):
+                continue
+            if np.isfinite(number):
+                found.append((number, f"This comes out if {first}, and {second}."))
+    return tuple(found)
+
+
+def quantity(answer: float, given: dict[str, float], close: float) -> str | None:
+    """What an answer is if it is made of the given quantities: one of them, a sum, a difference, or
+    a product of powers with a simple factor.
     """
-    found = [(number, name) for name, number in given if number]
-    pairs = []
-    for (a, first), (b, second) in permutations(found, 2):
-        pairs += [(a * b, f"{first} * {second}"), (a + b, f"{first} + {second}")]
-        pairs += [(a - b, f"{first} - {second}"), (a / b, f"{first} / {second}")]
-    squares = [(a * a, f"{name}**2") for a, name in found]
-    rows: list[tuple[float, str]] = []
-    for (a, first), (b, second) in product(pairs, found) if len(found) <= 6 else ():
-        rows += [(a - b, f"{first} - {second}"), (b - a, f"{second} - ({first})")]
-        rows += [(a * b, f"({first}) * {second}")]
-        rows += [(a / b, f"({first}) / {second}")]
-        if a:
-            rows.append((b / a, f"{second} / ({first})"))
-    return (*found, *squares, *pairs, *rows)
+    known = {name: number for name, number in given.items() if number}
+    for (first, a), (second, b) in permutations(known.items(), 2):
+        for number, name in ((a + b, f"{first} + {second}"), (a - b, f"{first} - {second}")):
+            if np.isclose(answer, number, rtol=close, atol=0):
+                return name
+    if not known or len(known) > MOST_QUANTITIES:
+        return None
+    exponents = (0, 1, -1, 2, -2) if len(known) <= 4 else (0, 1, -1)
+    powers = np.array(list(product(exponents, repeat=len(known))))
+    powers = powers[np.argsort(abs(powers).sum(axis=1), kind="stable")]
+    numbers = np.prod(np.array(list(known.values())) ** powers.astype(float), axis=1)
+    short = abs(powers).sum(axis=1) <= 2  # more of them come out by chance
+    for factor, name in (
+        (1.0, ""),
+        (2.0, "2 * "),
+        (0.5, "0.5 * "),
+        (4.0, "4 * "),
+        (0.25, "0.25 * "),
+    ):
+        near = np.where(short & (factor == 1), close, EXACT)
+        for k in np.flatnonzero(abs(factor * numbers - answer) <= near * abs(answer))[:1]:
+            parts = [
+                one if power == 1 else f"{one}**{power}"
+                for one, power in zip(known, powers[k], strict=True)
+                if power
+            ]
+            return name + " * ".join(parts or ["1"])
+    return None

@@ -9,7 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from experiments.course.mistakes import FACTORS, combinations, value, wrong_values
+from experiments.course.mistakes import (
+    EXACT,
+    FACTORS,
+    quantity,
+    two_mistakes,
+    value,
+    wrong_values,
+)
 from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, wrong
 
 UNITS = (1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)
@@ -160,12 +167,13 @@ class Numbers:
                 return wrong("place", f"This is the right number {j + 1}: it belongs there only.")
         if 0 < right[i] < 1 and np.isclose(answer, 1 - right[i], rtol=self.close):
             return wrong("rest", "This is the rest: one minus the right answer.")
-        known = combinations(tuple(self.given.items()))
-        pairs = 4 * len(self.given) ** 2  # of more quantities, some come out by chance
-        near = np.array([self.close] * pairs + [1e-6] * len(known))[: len(known)]
-        numbers = np.array([number for number, _ in known])
-        for k in np.flatnonzero(np.abs(numbers - answer) <= near * abs(answer))[:1]:
-            return wrong("combination", f"This is `{known[k][1]}`: that is another quantity.")
+        name = quantity(answer, self.given, self.close)
+        if name:
+            return wrong("combination", f"This is `{name}`: that is another quantity.")
+        formula = self.formulas[i] if i < len(self.formulas) else "0"
+        for number, told in two_mistakes(formula, tuple(self.given.items())):
+            if abs(answer - number) <= EXACT * abs(number):
+                return wrong("formula", told)
         return None
 
     def agrees_alone(self, answer: float, right: float) -> bool:

@@ -91,7 +91,7 @@ assert problem.Q[0, 1] > 0
 # ## Three answers
 #
 # A contact can be open, stick, slip to the left, or slip to the right. `all_solutions` tries these
-# states by a mixed-integer program, until no combination is left. We push with 0.8 N, press with 1
+# states one after the other, until no combination is left. We push with 0.8 N, press with 1
 # N, and take $\mu = 1$:
 
 # %%

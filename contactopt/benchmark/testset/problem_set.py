@@ -54,35 +54,19 @@ class Problem:
         return self.known.get("reference")
 
     def load(self) -> InterfaceProblem:
-        """Generate the problem, or read it from its file.
-
-        Returns
-        -------
-        The interface problem. InputError where the row of the set or the file makes none.
-        """
+        """Generate the problem, or read it from its file; InputError where that makes none."""
         return self.spec.build({})
 
 
 def problems(
     tier: str = "", tags: Iterable[str] = (), testset: str = "1", folder: Path = Path()
 ) -> list[Problem]:
-    """Find the problems of a test set.
+    """The problems of a test set, in its order: of one of TIERS or of all, and with `tags` that all
+    hold, such as "dim=3", "contacts<100" or "symmetric=false". InputError for an unknown set, tier
+    or tag, and for rows of a file that make no problem.
 
-    Parameters
-    ----------
-    tier : one of TIERS; all of them by default
-    tags : conditions that all must hold, as "dim=3", "contacts<100" or "symmetric=false"
-    testset : the number of a set of contactopt, a TOML file, or a folder of files of FCLib or
-        Siconos, whose problems are all in the tier "small"
-    folder : the folder from which the name of a file counts
-
-    Returns
-    -------
-    The problems, in the order of the set.
-
-    Raises
-    ------
-    InputError : for an unknown set, tier or tag, and for rows of a file that make no problem
+    `testset` is the number of a set of contactopt, a TOML file, or a folder of files of FCLib or
+    Siconos, whose problems are all in the tier "small". The name of a file counts from `folder`.
     """
     if tier and tier not in TIERS:
         raise InputError(f"unknown tier {tier!r}; choose from {', '.join(TIERS)}.")

@@ -33,16 +33,8 @@ TAGS = {
 
 
 def tags_of(problem: InterfaceProblem) -> dict[str, Any]:
-    """Compute the tags of a problem, the keys of TAGS.
-
-    Parameters
-    ----------
-    problem : of any form
-
-    Returns
-    -------
-    Their values; None for what was not computed because the problem is large, or because its law
-    or its form does not allow it.
+    """The tags of a problem, by the keys of TAGS. None stands for what was not computed because the
+    problem is large, or because its law or its form does not allow it.
     """
     products = isinstance(problem.Q, InterfaceOperator)
     tags: dict[str, Any] = {

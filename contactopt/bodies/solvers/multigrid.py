@@ -260,15 +260,10 @@ def _smoothed(
     return sp.bsr_matrix(tentative - U).astype(A.dtype)
 
 
-def near_neighbours(A: sp.bsr_matrix, points: np.ndarray) -> sp.csr_matrix:
-    """Pattern (k, k) of ones of the neighbours in the graph of A, in blocks of k nodes at points
-    (dim, k), at no more than NEAR times the distance of the nearest one of either, and of itself.
-    """
-    return _pattern(A, _near(A, points))
-
-
 def _near(A: sp.bsr_matrix, points: np.ndarray) -> np.ndarray:
-    """Marks the blocks of A that stand in the pattern of near neighbours."""
+    """Marks the blocks of A of near neighbours among its nodes at points (dim, k): at no more than
+    NEAR times the distance of the nearest one of either, and of itself.
+    """
     row, column = _rows_of(A), A.indices
     distance = np.zeros(len(row))
     for x in points:

@@ -174,9 +174,7 @@ def _cut(graph: sp.csr_matrix, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _node_graph(A: sp.csr_matrix, own: np.ndarray, count: int) -> sp.csr_matrix:
-    """Pattern (count, count) of the nodes whose unknowns meet in A; own (n,) is the node of each
-    unknown.
-    """
+    """Pattern (count, count) of nodes whose unknowns meet in A; own (n,) is each unknown's node."""
     gather = sp.csr_matrix(
         (np.ones(len(own), np.int32), (own, np.arange(len(own)))), (count, len(own))
     )

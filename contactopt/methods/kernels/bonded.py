@@ -112,7 +112,5 @@ def bonded(problem: InterfaceProblem) -> Bonded | None:
 
 
 def last_bonded(problem: InterfaceProblem) -> Bonded | None:
-    """The factors of a problem, in the units of `dimensionless`, if Newton's method made them last
-    for it; else None.
-    """
+    """The factors of a problem made dimensionless, if Newton's method made them last; else None."""
     return next((made for origin, made in tuple(_last) if origin() is problem), None)

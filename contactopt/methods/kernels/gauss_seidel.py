@@ -10,6 +10,9 @@ Source: Walker, Ni (2011), Anderson acceleration for fixed-point iterations.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -20,6 +23,11 @@ try:
 except ImportError:  # installed without a compiler
     sweeps = None
 NONE = np.zeros(0, dtype=np.int64)
+
+
+def compiled(name: str) -> Callable[..., Any] | None:
+    """A function of kernels/sweeps.c; None where there is none, or an older one."""
+    return getattr(sweeps, name, None)
 
 
 class Sweeps:

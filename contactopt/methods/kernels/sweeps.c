@@ -344,7 +344,78 @@ static PyObject *sweep(PyObject *self, PyObject *args)
     return at == NULL ? PyErr_NoMemory() : Py_BuildValue("dn", change, count);
 }
 
+#define NOISE 1e-13 /* relative size of what rounding leaves of a zero */
+
+/* The largest entry of row i of Q. */
+static double row_size(const Matrix *Q, Py_ssize_t n, Py_ssize_t i)
+{
+    int64_t from = Q->first ? Q->first[i] : i * n, to = Q->first ? Q->first[i + 1] : from + n;
+    double most = 0.0;
+    for (int64_t place = from; place < to; place++)
+        most = fmax(most, fabs(Q->entries[place]));
+    return most;
+}
+
+/* Local problems of Coulomb's law, as contactopt.problem.scaling has them: a component that nothing
+moves gets the mean compliance, so that it bears no force. diag (n,) is room. */
+static void prepare(int dim, const Matrix *Q, const double *q, const double *mu, double *diag,
+                    Local *at)
+{
+    Py_ssize_t n = Q->k * dim, positive = 0;
+    double sum = 0.0, largest = 0.0, farthest = 0.0;
+    for (Py_ssize_t i = 0; i < n; i++) {
+        double W[9] = {0.0};
+        own_block(dim, i / dim, Q, W);
+        diag[i] = W[(i % dim) * (dim + 1)];
+        if (diag[i] > 0)
+            sum += diag[i], positive++;
+        largest = fmax(largest, fabs(diag[i])), farthest = fmax(farthest, fabs(q[i]));
+    }
+    for (Py_ssize_t i = 0; i < Q->k; i++) {
+        double W[9] = {0.0};
+        own_block(dim, i, Q, W);
+        for (Py_ssize_t a = 0, j = i * dim; a < dim; a++, j++)
+            if (fabs(diag[j]) <= NOISE * largest && fabs(q[j]) <= NOISE * farthest &&
+                row_size(Q, n, j) <= NOISE * largest)
+                W[a * (dim + 1)] = positive ? sum / positive : 1.0;
+        at[i] = local_of(dim, W, mu[i], 0);
+    }
+}
+
+static PyObject *small(PyObject *self, PyObject *args)
+{
+    int dim, most;
+    Py_ssize_t count, more;
+    double nearly, swept, look, change = INFINITY;
+    Py_buffer first, columns, entries, mu, q, r;
+    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*w*inddd", &dim, &first, &columns, &entries, &mu, &q,
+                          &r, &most, &count, &nearly, &swept, &look))
+        return NULL;
+    Py_ssize_t k = mu.len / (Py_ssize_t)sizeof(double), n = k * dim;
+    Matrix Q = {entries.buf, first.len ? first.buf : NULL, columns.buf, k};
+    double *room = most > LONGEST ? NULL : calloc(2 * n + work_of(most, n) + 1, sizeof(double));
+    Local *at = room ? malloc((k ? k : 1) * sizeof(Local)) : NULL;
+    if (at != NULL) {
+        Py_BEGIN_ALLOW_THREADS;
+        Memory past = memory_in(room + 2 * n, most, n);
+        prepare(dim, &Q, q.buf, mu.buf, room + n, at);
+        change = sweep_over(dim, &count, 1.0, nearly, &Q, q.buf, at, r.buf, room, &past);
+        if (change <= nearly && count <= look) {
+            more = 2 * count; /* the last digits take less than the first */
+            sweep_over(dim, &more, 1.0, swept, &Q, q.buf, at, r.buf, room, &past);
+        }
+        Py_END_ALLOW_THREADS;
+    }
+    free(room), free(at);
+    PyBuffer_Release(&first), PyBuffer_Release(&columns), PyBuffer_Release(&entries);
+    PyBuffer_Release(&mu), PyBuffer_Release(&q), PyBuffer_Release(&r);
+    PyObject *there = change <= nearly ? Py_True : Py_False;
+    return at == NULL ? PyErr_NoMemory() : Py_BuildValue("nO", count, there);
+}
+
 static PyMethodDef functions[] = {
+    {"small", small, METH_VARARGS, "Sweep a problem in any units until most digits are there, and if"
+     " this takes at most `look` sweeps all; the number of the first ones, and whether it is so."},
     {"sweep", sweep, METH_VARARGS,
      "Sweep at most `count` times over all contacts; the last change over the forces, the sweeps."},
     {NULL, NULL, 0, NULL}};

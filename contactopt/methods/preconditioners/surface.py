@@ -55,22 +55,10 @@ Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
     """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of
-    one.
+    one. InputError if the problem does not know the cells of its contact surface.
 
-    The mean diagonal is an estimate by random signs (Hutchinson 1989).
-
-    Parameters
-    ----------
-    problem : whose chart knows the cells of the contact surface
-    held : (k, dim) mask of the components that cannot move
-
-    Returns
-    -------
-    The two products.
-
-    Raises
-    ------
-    InputError : If the problem does not know the cells of its contact surface.
+    `held` (k, dim) are the components that cannot move. The mean diagonal is an estimate by random
+    signs (Hutchinson 1989).
     """
     cells = problem.chart.cells
     if cells is None:

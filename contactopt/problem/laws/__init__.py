@@ -103,7 +103,11 @@ def find_law(name: str) -> type[Law]:
 
     Returns
     -------
-    The subclass of Law. InputError if there is no law of that name.
+    The subclass of Law.
+
+    Raises
+    ------
+    InputError : If there is no law of that name.
     """
     if not isinstance(name, str) or name not in LAWS:
         raise InputError(f"unknown law {name!r}; choose from {', '.join(LAWS)}.")
@@ -126,8 +130,12 @@ def make_law(name: str, value: Any, place: Place, positions: np.ndarray) -> Law:
 
     Returns
     -------
-    The law, with one parameter for each contact. InputError on an unknown name and on values that
-    are not numbers, negative, or of another shape.
+    The law, with one parameter for each contact.
+
+    Raises
+    ------
+    InputError : On an unknown name and on values that are not numbers, negative, or of another
+        shape.
     """
     values = real_array("the friction of a scene", value(positions) if callable(value) else value)
     return find_law(name).of_place(values, place).spread(len(place.areas))

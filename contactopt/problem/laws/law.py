@@ -89,12 +89,7 @@ class Law:
 
     @classmethod
     def plain_coulomb(cls) -> bool:
-        """Tell whether the bound is mu r_n in all directions, and slip does not open the gap.
-
-        Returns
-        -------
-        True for Coulomb's law alone.
-        """
+        """Whether the bound is mu r_n in all directions and slip does not open the gap."""
         return (
             cls.proportional and cls.frictional and cls.opens and not (cls.dilatant or cls.directed)
         )
@@ -175,16 +170,7 @@ class Law:
         raise NotImplementedError
 
     def nearest(self, y: np.ndarray, r_n: np.ndarray) -> np.ndarray:
-        """Project points on the set K of forces.
-
-        Parameters
-        ----------
-        y, r_n : As for `nearest_derivative`.
-
-        Returns
-        -------
-        (k, dim) nearest points [force].
-        """
+        """The nearest points (k, dim) of the set K of forces; see `nearest_derivative`."""
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
@@ -237,17 +223,7 @@ class Law:
         return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
 
     def on_kinks(self, y: np.ndarray, kinks: Kinks) -> np.ndarray:
-        """Move points onto their kinks.
-
-        Parameters
-        ----------
-        y : (k, dim) points, normal first [force].
-        kinks : The masks of the points that are moved.
-
-        Returns
-        -------
-        (k, dim) points. The others are as before.
-        """
+        """Points y (k, dim) [force], of which those in the masks are moved onto their kinks."""
         out = y.copy()
         out[kinks.normal, 0] = 0.0
         edge = unit(y[:, 1:]) * self.bound_along(out)[:, None]
@@ -318,69 +294,24 @@ class Law:
         return self
 
     def times(self, factor: float) -> Self:
-        """Multiply the friction of the law.
-
-        Parameters
-        ----------
-        factor : What it is multiplied with.
-
-        Returns
-        -------
-        The law with that friction.
-        """
+        """The law with its friction multiplied by a factor."""
         return self._mapped(lambda parameter: factor * parameter)
 
     def shifted(self, change: np.ndarray) -> Self:
-        """Change the parameter of the law. It does not fall below zero.
-
-        Parameters
-        ----------
-        change : (k,) what is added.
-
-        Returns
-        -------
-        The law with that parameter.
-        """
+        """The law with `change` (k,) added to its parameter, which does not fall below zero."""
         return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
 
     def select(self, contacts: np.ndarray) -> Law:
-        """Take the law of some contacts alone.
-
-        Parameters
-        ----------
-        contacts : Their numbers, with repetitions if wanted, or a mask (k,).
-
-        Returns
-        -------
-        The law of these contacts.
-        """
+        """The law of some contacts, given by a mask (k,) or their numbers, which may repeat."""
         return self._mapped(lambda parameter: parameter[contacts])
 
     def lumped(self, first: np.ndarray, count: int) -> Law:
-        """Make the law of groups of contacts that act as one.
-
-        Parameters
-        ----------
-        first : The first contact of each group.
-        count : Number of contacts of a group.
-
-        Returns
-        -------
-        The law, with one contact for each group.
-        """
+        """The law of groups of `count` contacts that act as one, each by its `first`."""
         return self.select(first)
 
     def spread(self, k: int) -> Self:
-        """The law of k contacts, whose numbers become arrays.
-
-        Parameters
-        ----------
-        k : Number of contacts.
-
-        Returns
-        -------
-        A law of the same kind, with parameters (k,). InputError if one is an array of another
-        length.
+        """The law of k contacts, whose numbers become arrays (k,). InputError if one is an array of
+        another length.
         """
         for name in self.parameters:
             shape = np.shape(getattr(self, name))

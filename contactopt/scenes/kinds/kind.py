@@ -31,69 +31,25 @@ class Kind:
         return len(self.components)
 
     def measure(self, thickness: float) -> float:
-        """Compute what integrals over the mesh are multiplied with; if revolved also with r.
-
-        Parameters
-        ----------
-        thickness : Of the scene [length].
-
-        Returns
-        -------
-        The thickness, 2 pi or 1.
+        """What integrals over the mesh are multiplied with, and if revolved also with r: the
+        thickness of the scene, 2 pi or 1.
         """
         return thickness
 
     def constants(self, material: Material) -> tuple[float, float]:
-        """Compute lambda and G with stress = lambda tr(strain) 1 + 2 G strain in the mesh's axes.
-
-        Parameters
-        ----------
-        material : Young's modulus and Poisson's ratio.
-
-        Returns
-        -------
-        Both constants [stress].
-        """
+        """lambda and G of stress = lambda tr(strain) 1 + 2 G strain in the mesh's axes [stress]."""
         return lame(material)
 
     def constants_by_poisson(self, material: Material) -> tuple[float, float]:
-        """Differentiate `constants` by Poisson's ratio.
-
-        Parameters
-        ----------
-        material : Young's modulus and Poisson's ratio.
-
-        Returns
-        -------
-        Both derivatives [stress].
-        """
+        """The derivatives of `constants` by Poisson's ratio [stress]."""
         return lame_by_poisson(material)
 
     def half_width(self, area: float, thickness: float) -> float:
-        """Compute the half-width of a contact zone of a simple shape: of a strip of the thickness,
-        of a disc, or of a square.
-
-        Parameters
-        ----------
-        area : Of the zone [length^2].
-        thickness : Of the scene [length].
-
-        Returns
-        -------
-        Half its width, or its radius [length].
+        """The half-width or radius [length] of a contact zone of this area and a simple shape: a
+        strip of the thickness, a disc or a square.
         """
         return area / (2 * thickness)
 
     def area(self, half_width: float, thickness: float) -> float:
-        """Invert `half_width`.
-
-        Parameters
-        ----------
-        half_width : Of the zone [length].
-        thickness : Of the scene [length].
-
-        Returns
-        -------
-        The area of the zone [length^2].
-        """
+        """The area [length^2] of a contact zone of this half-width: the inverse of `half_width`."""
         return 2 * half_width * thickness
