@@ -454,10 +454,9 @@ def test_answers_of_another_size_are_not_compared(tmp_path):
     rows[0]["answer"], rows[0]["residual"] = store.pack(np.zeros(3)), 1e-9
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
     assert benchmark.load(path)["error"].isna().sum() in (1, len(rows), len(rows) - 1)
-    rows[0]["answer"] = "not base64"
+    rows[0]["answer"] = "not base64"  # told with its line, and left out
     path.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    with pytest.raises(InputError, match="cannot read"):
-        benchmark.load(path)
+    assert len(benchmark.load(path)) == len(rows) - 1
 
 
 @pytest.mark.slow

@@ -55,7 +55,7 @@ def test_a_page_runs_as_it_stands(name, tmp_path, monkeypatch, capsys):
                 assert main(line.split()[1:]) == 0, capsys.readouterr().err
     if name == "experiment_files":
         report = Path("out/bench/friction/report.md").read_text()
-        assert report.count("*Table ") == 3 and report.count("*Figure ") == 5
+        assert report.count("*Table ") == 4 and report.count("*Figure ") == 5
         assert Path("out/bench/friction/report.html").exists()
 
 
@@ -69,6 +69,7 @@ def test_every_key_of_an_experiment_file_is_explained_with_an_example_that_is_re
         "path",
         "skipped",
         "absent",
+        "sources",
     }
     drawn = FIGURES | TABLES
     assert set(KINDS) == set(drawn)

@@ -119,6 +119,12 @@ def test_a_plane_problem_reaches_a_peer_in_space_and_without_units():
     answer = peer.answer(InterfaceProblem(Q, q, Coulomb(np.array([0.3]))), 1e-8, 1.0)
     assert answer.status == "error" and seen["q"].shape == (1, 3) and seen["q"][0, 2] == 0.0
     assert 0.1 < np.abs(seen["q"]).max() < 10.0 and 0.1 < seen["data"].max() < 10.0
+    # a solver of the plane gets the problem as it is, and none in space
+    peer.answer(InterfaceProblem(Q, q, Coulomb(np.array([0.3]))), 1e-8, 1.0, (2, 3))
+    assert seen["q"].shape == (1, 2) and seen["data"].shape == (1, 2, 2)
+    space = InterfaceProblem(np.eye(3), np.zeros((1, 3)), Coulomb(np.array([0.3])))
+    with pytest.raises(InputError, match="plane"):
+        peer.answer(space, 1e-8, 1.0, (2,))
 
 
 @pytest.mark.slow
@@ -142,6 +148,29 @@ def test_solvers_of_others_find_the_certified_answer(module):
     assert len(plates.s) and solve(plates).solved
     with pytest.raises(InputError, match="plates"):
         getattr(module, name)(plates, 1e-8, 10.0, solver)
+
+
+@pytest.mark.slow
+def test_siconos_solvers_of_the_plane_take_the_plane_symmetric_or_not():
+    try:
+        _, version = siconos_numerics.PEER.found()
+    except InputError as absent:
+        pytest.skip(str(absent))
+    assert version and version != "0"
+    A = np.random.default_rng(1).normal(size=(12, 12))
+    Q = A @ A.T / 12 + np.eye(12) + 0.4 * (A - A.T)
+    skew = InterfaceProblem(Q, A[:6, :2].copy(), Coulomb(np.full(6, 0.3)))
+    for solver in siconos_numerics.SOLVERS[2]:
+        packing = FAMILIES["packing"](dim=2, bodies=9, mu=0.3)
+        for problem in (packing, skew)[: 1 if solver == "CPG" else 2]:  # it minimises an energy
+            answer = siconos_numerics.siconos(problem, 1e-10, 10.0, solver)
+            assert natural_map_residual(problem, answer.reactions) <= 1e-6, solver
+    space = FAMILIES["rigid_bodies"](bodies=4, contacts=6, mu=0.3)
+    assert siconos_numerics.siconos(space, 1e-8, 10.0, "NSGS").status == "solved"
+    with pytest.raises(InputError, match="plane"):
+        siconos_numerics.siconos(space, 1e-8, 10.0, "LEMKE")
+    with pytest.raises(InputError, match="choose from"):
+        siconos_numerics.siconos(space, 1e-8, 10.0, "LEMK")
 
 
 def test_what_is_not_installed_is_named_with_the_line_that_installs_it():

@@ -77,6 +77,7 @@ def run_campaign(
         bar = progress(e.name, len(runs), len(runs) - len(tasks), quiet)
         with closing(run_locally(tasks, jobs, History(lines(store.path)))) as rows, bar as shown:
             _keep(rows, store, shown)
+        store.keep_own()
         save(load(store.path, absent=True), folder / "rows.parquet")
     return folder
 

@@ -18,7 +18,7 @@ from typing import Any
 from contactopt.benchmark.entries import Entries, size_of, twice_in
 from contactopt.benchmark.keys import EXPERIMENT
 from contactopt.benchmark.keys import KINDS as FIGURE_KINDS
-from contactopt.benchmark.plugins import Registry
+from contactopt.benchmark.plugins import Registry, source_of
 from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
 from contactopt.benchmark.runs import SETTINGS, MethodSpec, Run, method_spec
 from contactopt.benchmark.testset.problem_set import of_set
@@ -50,6 +50,7 @@ class Experiment:
     path     of the file
     skipped  why optional entries are left out
     absent   methods among them, and why
+    sources  of each plug-in method and family, a digest of its file
     """
 
     name: str
@@ -72,6 +73,7 @@ class Experiment:
     path: Path = Path()
     skipped: tuple[str, ...] = ()
     absent: tuple[tuple[str, str], ...] = ()
+    sources: Mapping[str, str] = field(default_factory=dict)
 
     def runs(self, filters: Sequence[str] = ()) -> list[Run]:
         """All runs, those of a problem together; filters: COLUMN=PATTERN, all must match."""
@@ -86,13 +88,16 @@ class Experiment:
             str(setting): SETTINGS.get(str(setting)) or float(setting) for setting in self.settings
         }
         runs = [
-            Run(problem, method, setting, tolerance, repeat)
+            Run(problem, method, setting, tolerance, repeat, self._source(problem, method))
             for problem in self.problems
             for repeat, (setting, tolerance), method in product(
                 range(self.repeats), tolerances.items(), self.methods
             )
         ]
         return [run for run in runs if all(_matches(run, text) for text in filters)]
+
+    def _source(self, problem: ProblemSpec, method: MethodSpec) -> str:
+        return "".join(self.sources.get(name, "") for name in (problem.name, method.name))
 
 
 def _matches(run: Run, text: str) -> bool:
@@ -139,6 +144,8 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
     problems = reader.expanded("problems", (*KINDS, "testset"), problem)
     methods = reader.expanded("methods", ("method",), method)
     skipped = tuple(why for *_, why in reader.absent)
+    declared = {name: plugin.make for name, plugin in registry.methods.items()}
+    declared |= registry.problems
     if not problems or not methods:
         raise NothingToRun(f"'{path}': nothing is left to run; " + " ".join(skipped))
     return replace(
@@ -152,6 +159,7 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
             for key, name, given, why in reader.absent
             if key == "methods"
         ),
+        sources={name: source_of(make) for name, make in declared.items()},
     )
 
 

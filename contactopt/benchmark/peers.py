@@ -3,9 +3,9 @@
 A peer is a plug-in file with three functions that the other Python runs. They import what they
 need, and use no name from outside themselves. `version()` returns the version of the solver.
 `prepare(problem, tol, settings)` makes what the solver takes of the problem, a mapping of arrays:
-Q in rows of blocks (3, 3), namely `indptr`, `indices` and `data`, and `q` (k, 3) and `mu` (k,). The
-normal component comes first. `solve(prepared)` returns the forces, whether the solver claims
-success, and its iterations. Only `solve` is timed.
+Q in rows of blocks (dim, dim), namely `indptr`, `indices` and `data`, and `q` (k, dim) and `mu`
+(k,). The normal component comes first. `solve(prepared)` returns the forces, whether the solver
+claims success, and its iterations. Only `solve` is timed.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import inspect
 import json
 import subprocess
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -113,19 +113,29 @@ class Peer:
         raise InputError(f"{self.name} is not installed; {self.install}")
 
     def answer(
-        self, problem: InterfaceProblem, tol: float, time_limit: float, **settings: Any
+        self,
+        problem: InterfaceProblem,
+        tol: float,
+        time_limit: float,
+        dims: Collection[int] = (3,),
+        **settings: Any,
     ) -> Answer:
-        """Let the solver answer a problem without plates, which it gets in space and without units.
+        """Let the solver answer a problem without plates, which it gets without units.
+
         The tolerance is the solver's own [-], `time_limit` is in seconds, and `prepare` gets the
-        settings.
+        settings. `dims` are the dimensions that the solver takes, of 2 and 3: without 2, a problem
+        of the plane gets a second tangent along which nothing moves.
         """
         if len(problem.s):
             raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")
+        if problem.dim not in dims and 3 not in dims:
+            raise InputError(f"this solver of {self.name} is one of the plane.")
         if isinstance(problem.Q, InterfaceOperator):
             problem = problem.explicit()
         p, scales = dimensionless(problem)
-        p = _in_space(p)
-        Q = sp.bsr_array(sp.csr_array(p.Q), blocksize=(3, 3))
+        if problem.dim not in dims:
+            p = _in_space(p)
+        Q = sp.bsr_array(sp.csr_array(p.Q), blocksize=(p.dim, p.dim))
         Q.sort_indices()
         arrays = {"indptr": Q.indptr, "indices": Q.indices, "data": Q.data}
         with tempfile.NamedTemporaryFile(suffix=".npz") as file:
@@ -182,12 +192,10 @@ def _said(python: str, program: str) -> str:
 
 
 def _in_space(problem: InterfaceProblem) -> InterfaceProblem:
-    """The same problem with a second tangent along which nothing moves: Q gets there the mean of
-    its diagonal, and q gets 0. A problem in space is returned as it is.
+    """A problem of the plane with a second tangent along which nothing moves: Q gets there the mean
+    of its diagonal, and q gets 0.
     """
-    k, dim = problem.q.shape
-    if dim == 3:
-        return problem
+    k = len(problem.q)
     Q, new = problem.Q, float(problem.Q.diagonal().mean()) * sp.eye_array(k)
     order = np.concatenate([np.arange(2 * k).reshape(k, 2), 2 * k + np.arange(k)[:, None]], axis=1)
     order = order.ravel()

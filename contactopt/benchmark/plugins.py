@@ -91,6 +91,16 @@ class Registry:
         return self.methods.get(name)
 
 
+def source_of(declared: Any) -> str:
+    """Digest of the file that declares a function or class, "" where there is no such file."""
+    try:
+        path = inspect.getsourcefile(declared)
+    except TypeError:
+        return ""
+    found = path is not None and Path(path).is_file()
+    return hashlib.sha256(Path(str(path)).read_bytes()).hexdigest()[:16] if found else ""
+
+
 def method(make: Any = None, *, name: str | None = None, peer: Peer | None = None) -> Any:
     """Declare a function or class as a method of the benchmark.
 

@@ -72,17 +72,18 @@ class Worker:
         if hopeless:
             words = "not made: a looser tolerance already took more than the time limit"
             return row | {"status": "time_limit", "message": words, "call_seconds": task.time_limit}
+        # a plug-in may keep answers, and what it does to its process, to itself; a peer has another
+        alone = task.run.method.foreign and not task.run.method.peer
         begin = time.perf_counter()
         try:
-            row |= judge(task, self.problem, self._answer(task))
+            answer = self._answer(task)
         except Ended as end:
             spent = time.perf_counter() - begin
             return row | {"status": end.status, "message": str(end), "call_seconds": spent}
-        # a peer fails in its own process
-        alone = task.run.method.foreign and not task.run.method.peer
-        if alone and not row["success"] and row["status"] != "refused":
-            self.solver.known["doubted"] = task.run.method.label
-        return row
+        if alone:
+            self.solver.kill()
+            self.solver.start()
+        return row | judge(task, self.problem, answer)
 
     def _build(self, task: Task) -> None:
         """Hold the task's problem, or why it cannot be built."""
@@ -109,8 +110,6 @@ class Worker:
 
     def _answer(self, task: Task) -> Answer:
         """What the method answers. Raises Ended if its process did not outlive it."""
-        if self.solver.known.get("doubted") not in (None, task.run.method.label):
-            self.solver.kill()
         answer = None
         while answer is None:  # its process may have been replaced since it got the problem
             try:
@@ -173,12 +172,12 @@ class Shares:
 class History:
     """What earlier runs say of later ones.
 
-    A run that took more than LONG is not repeated. Where one was ended at its limit of time, so
-    would be those of tighter tolerances, which are not made.
+    A run that took more than LONG, or was refused, is not repeated. Where one was ended at its
+    limit of time, so would be those of tighter tolerances, which are not made.
     """
 
     def __init__(self, rows: Iterable[Mapping[str, Any]] = ()):
-        self.slow: set[tuple[str, ...]] = set()
+        self.once: set[tuple[str, ...]] = set()
         self.ended: dict[tuple[str, ...], float] = {}  # -> the tolerance
         for row in rows:
             self.add(row)
@@ -186,15 +185,15 @@ class History:
     def add(self, row: Mapping[str, Any]) -> None:
         """Take a row into account."""
         key = row["problem"], row["method"]
-        if row["call_seconds"] > LONG:
-            self.slow.add((*key, row["setting"]))
+        if row["call_seconds"] > LONG or row["status"] == "refused":
+            self.once.add((*key, row["setting"]))
         if row["status"] in ("time_limit", "killed"):
             self.ended[key] = max(row["tolerance"], self.ended.get(key, 0.0))
 
     def repeated(self, run: Run) -> bool:
-        """Whether a run is a repeat of a slow one."""
+        """Whether a run is a repeat of one that is made once."""
         key = run.problem.label, run.method.label, run.setting
-        return run.repeat > 0 and key in self.slow
+        return run.repeat > 0 and key in self.once
 
     def hopeless(self, run: Run) -> bool:
         """Whether the same method had not enough time for a looser tolerance."""

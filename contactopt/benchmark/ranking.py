@@ -39,14 +39,21 @@ JOINED = {
 
 
 def points(table: pd.DataFrame) -> pd.DataFrame:
-    """A row per problem, method and tolerance: times [s], worst certificate, memory."""
+    """A row per problem, method and tolerance: times [s], worst certificate, memory.
+
+    `counted` is CPU time, or wall time where that is above BUSY times CPU time: the method slept,
+    or let somebody else compute.
+    """
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
     refused = table["status"] == REFUSED
     groups = table.assign(_memory=memory, _refused=refused).groupby(POINT, sort=False)
     times = groups["cpu_seconds"]
-    quartiles = {"low": times.quantile(0.25), "high": times.quantile(0.75)}
-    return groups.agg(**joined).assign(**quartiles).reset_index()
+    found = groups.agg(**joined)
+    found = found.assign(low=times.quantile(0.25), high=times.quantile(0.75))
+    elsewhere = (found["wall"] > np.maximum(BUSY * found["cpu"], NOISE)) & ~found["refused"]
+    found["counted"] = found["cpu"].where(~elsewhere, found["wall"])
+    return found.reset_index()
 
 
 def taken(points: pd.DataFrame) -> pd.DataFrame:
@@ -72,7 +79,8 @@ def achieved(points: pd.DataFrame, accuracy: float, time: str = "cpu") -> pd.Dat
 
     if points.empty:
         return pd.DataFrame(dtype=float)
-    fronts = points.groupby(["problem", "method"], sort=False)[[time, "residual", "limit"]]
+    column = "counted" if time == "cpu" else time
+    fronts = points.groupby(["problem", "method"], sort=False)[[column, "residual", "limit"]]
     seconds = fronts.apply(lambda rows: _seconds_to(accuracy, *rows.to_numpy(float).T))
     return seconds.unstack("method").fillna(np.inf)
 
@@ -219,9 +227,12 @@ def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def wall_over_cpu(table: pd.DataFrame) -> float:
-    """The median of wall time over CPU time of the calls: above BUSY nothing is ranked."""
+    """Wall time over CPU time of the calls, above BUSY of which nothing is ranked: the lower median
+    over the methods of each one's median, since one that sleeps says nothing of the machine.
+    """
     timed = table[table["cpu_seconds"] > NOISE]
-    return float((timed["call_seconds"] / timed["cpu_seconds"]).median())
+    ratios = (timed["call_seconds"] / timed["cpu_seconds"]).groupby(timed["method"]).median()
+    return float(ratios.quantile(0.5, interpolation="lower")) if len(ratios) else np.nan
 
 
 def warning(ratio: float) -> str:
@@ -230,5 +241,5 @@ def warning(ratio: float) -> str:
         return ""
     return (
         f"The median of wall time over CPU time is {ratio:.2f}, above {BUSY:g}: the machine was"
-        " busy, so nothing is ranked. The CPU times are shown as they are."
+        " busy, so nothing is ranked."
     )

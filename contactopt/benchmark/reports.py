@@ -175,6 +175,12 @@ def _foot(layout: Experiment, folder: Path, table: pd.DataFrame) -> str:
         f"Made by {made}.",
         _one_line(f"Environment: {machines}. {versions}. One BLAS thread."),
     ]
+    if (number := table["machine"].nunique()) > 1:
+        lines.insert(
+            1,
+            f"**These rows come from {number} machines.** The times of one machine say nothing"
+            " about those of another: compare only methods that ran on the same machine.",
+        )
     return "\n".join(lines + ([f"Backends: {', '.join(sorted(backends))}."] if backends else []))
 
 

@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from importlib.metadata import version
 from typing import Any
 
 from contactopt.benchmark.plugins import Registry
@@ -84,16 +85,22 @@ def _backends(name: str, settings: str, dims: tuple[int, ...]) -> str:
 
 @dataclass(frozen=True)
 class Run:
-    """One run; `key` tells it apart from all others of the same backends' versions."""
+    """One run; `key` tells it apart from all others, also from those of another version of this
+    package, of a backend, or of a plug-in.
+
+    source  digest of the plug-ins that declare its method and its problem, "" without
+    """
 
     problem: ProblemSpec
     method: MethodSpec
     setting: str
     tolerance: float
     repeat: int
+    source: str = ""
 
     @cached_property
     def key(self) -> str:
         method, backends = self.method.label, self.method.backends(2, 3)
-        parts = (self.problem.label, method, backends, self.setting, self.repeat)
+        made = version("contactopt"), backends, self.source
+        parts = (self.problem.label, method, made, self.setting, self.repeat)
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]

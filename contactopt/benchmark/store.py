@@ -10,6 +10,7 @@ import fcntl
 import json
 import logging
 import os
+import tempfile
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -65,12 +66,29 @@ class Store:
         with open(self.path, "rb") as rows:
             whole = sum(len(row) for row in rows if row.endswith(b"\n"))
         self.file.truncate(whole)  # the last line may be torn
+        self.own = tempfile.TemporaryFile()  # noqa: SIM115
+        self.own.write(self.path.read_bytes())
 
     def __enter__(self) -> Store:
         return self
 
     def __exit__(self, *error: object) -> None:
         self.file.close()
+        self.own.close()
+
+    def keep_own(self) -> None:
+        """Take out of the file, with a warning, what others wrote into it meanwhile."""
+        self.own.seek(0)
+        own = self.own.read()
+        if self.path.is_file() and self.path.read_bytes() == own:
+            return
+        _log.warning(
+            "'%s' was changed by something else while the campaign ran; only the campaign's own"
+            " rows are kept",
+            self.path,
+        )
+        with whole_file(self.path) as file:
+            file.write_bytes(own)
 
     def finished(self) -> set[str]:
         """Keys of the runs that have a row."""
@@ -78,7 +96,8 @@ class Store:
 
     def append(self, row: dict[str, Any]) -> None:
         """Write one row, or nothing of it: InputError if the disk is full."""
-        data, end = (json.dumps(row) + "\n").encode(), os.fstat(self.file.fileno()).st_size
+        row_line = data = (json.dumps(row) + "\n").encode()
+        end = os.fstat(self.file.fileno()).st_size
         try:
             while data:  # a second write only if the disk is nearly full or a signal came
                 data = data[self.file.write(data) :]
@@ -88,28 +107,51 @@ class Store:
                 f"cannot write into '{self.path}': {error.strerror}; finished runs are kept, make"
                 " room and go on with --resume."
             ) from error
+        self.own.write(row_line)
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl, without torn ones, with a warning; InputError on a newer schema."""
-    wanted, bad = COLUMNS.keys() - {"error"}, 0  # which load() works out
+    """The rows of a rows.jsonl. What is no row of a campaign is left out, with a warning that names
+    its line; InputError on a newer schema.
+    """
     with open(path, "rb") as file:
-        for line in file:
+        for number, line in enumerate(file, 1):
             try:
                 row = json.loads(line)
             except (ValueError, RecursionError):
                 row = None
-            if isinstance(row, dict) and row.get("schema", 0) > SCHEMA:
+            if isinstance(row, dict) and _is(row.get("schema"), "int") and row["schema"] > SCHEMA:
                 raise InputError(
                     f"'{path}' was written by a newer version"
                     f" (schema {row['schema']}); update contactopt."
                 )
-            if isinstance(row, dict) and row.keys() >= wanted:
-                yield row
+            if wrong := _wrong(row):
+                _log.warning("'%s', line %d: %s; it is left out", path, number, wrong)
             else:
-                bad += 1
-    if bad:
-        _log.warning("'%s': %d lines are no rows of a campaign and are left out", path, bad)
+                yield row
+
+
+def _wrong(row: Any) -> str:
+    """What makes a row none of a campaign, "" for nothing."""
+    if not isinstance(row, dict):
+        return "this is no row"
+    for name, (kind, _) in COLUMNS.items():
+        if name != "error" and not _is(row.get(name), kind):  # which load() works out
+            return f"the row has no '{name}' of the kind {kind}"
+    try:
+        _unpack(row.get("answer", ""))
+        for name, form in (("parameters", dict), ("settings", dict), ("history", list)):
+            if row[name] and not isinstance(json.loads(row[name]), form):
+                return f"'{name}' of the row holds no {form.__name__}"
+    except (ValueError, TypeError, RecursionError):
+        return "an entry of the row cannot be read"
+    return ""
+
+
+def _is(value: Any, kind: str) -> bool:
+    """Whether a value is of the kind of a column."""
+    kinds = {"int": int, "str": str, "float": int | float, "bool": bool}
+    return isinstance(value, kinds[kind]) and (kind == "bool" or not isinstance(value, bool))
 
 
 def pack(reactions: np.ndarray) -> str:

@@ -7,11 +7,14 @@ from __future__ import annotations
 import errno
 import inspect
 import os
+import pickle
 import random
+import resource
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -36,13 +39,23 @@ MB = 1e6
 FAILURES = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
 
 
+def _ended_cpu() -> float:
+    """CPU time of the children that ended [s], with that of theirs."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+# wall time, CPU time here, and that of ended children; as they were before any plug-in ran
+CLOCKS = time.perf_counter, time.process_time, _ended_cpu
+
+
 @dataclass
 class Kept:
-    """Plug-ins, and the problem of a label."""
+    """Plug-ins, and the problem of a label, pickled: each run gets an object of its own."""
 
     plugins: Registry = field(default_factory=Registry)
     label: str = ""
-    problem: InterfaceProblem | None = None
+    problem: bytes = b""
 
 
 _kept = Kept()
@@ -93,7 +106,11 @@ def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
 def hold(label: str, problem: InterfaceProblem, paths: tuple[str, ...]) -> None:
     """Keep a problem and plug-ins for the runs that follow."""
     _kept.plugins.load(paths)
-    _kept.label, _kept.problem = label, problem
+    for part in (problem, problem.law, problem.Q):  # no run profits of what another one computed
+        known = getattr(part, "__dict__", {})
+        for name in [n for n in known if isinstance(getattr(type(part), n, 0), cached_property)]:
+            del known[name]
+    _kept.label, _kept.problem = label, pickle.dumps(problem)
 
 
 def warm_up(task: Task, dim: int) -> None:
@@ -105,9 +122,9 @@ def warm_up(task: Task, dim: int) -> None:
 
 def execute(task: Task) -> Answer | None:
     """The answer to one task; None if its problem is not kept here."""
-    if _kept.problem is None or _kept.label != task.run.problem.label:
+    if not _kept.problem or _kept.label != task.run.problem.label:
         return None
-    return _measured(task, _kept.problem)
+    return _measured(task, pickle.loads(_kept.problem))
 
 
 def _measured(task: Task, problem: InterfaceProblem) -> Answer:
@@ -116,19 +133,22 @@ def _measured(task: Task, problem: InterfaceProblem) -> Answer:
     random.seed(task.seed)
     np.random.seed(task.seed)  # noqa: NPY002 (a plug-in may use the global generator)
     own, measured = os.getpid(), {"base_mb": _reset_peak()}
-    wall, cpu = time.perf_counter(), time.process_time()
+    others, begin = _running_cpu(), [clock() for clock in CLOCKS]
     try:
-        answer = _called(task, problem)
+        call = _call(task)
+        begin = [clock() for clock in CLOCKS]
+        answer = call(problem)
     except (Exception, SystemExit, KeyboardInterrupt) as error:
         answer = Answer(_word(error), one_line(error))
-    measured["call_seconds"] = time.perf_counter() - wall
-    measured["cpu_seconds"] = time.process_time() - cpu
+    wall, cpu, ended = (clock() - start for clock, start in zip(CLOCKS, begin))
+    measured["call_seconds"] = wall
+    measured["cpu_seconds"] = cpu + max(0.0, ended + _running_cpu() - others)
     measured["peak_mb"] = _memory("VmHWM")
     if os.getpid() != own:  # a copy of the true process, which a method forked and forgot
         os._exit(1)
     try:
-        # a peer measures itself, in its own process
-        measured |= answer.measured
+        if task.run.method.peer:  # it measures itself, in its own process
+            measured |= answer.measured
         if answer.reactions is not None:
             answer = _in_form(answer, problem, measured["call_seconds"])
     except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
@@ -143,8 +163,8 @@ def _word(error: BaseException) -> str:
     return next((word for kind, word in FAILURES.items() if isinstance(error, kind)), "error")
 
 
-def _called(task: Task, problem: InterfaceProblem) -> Answer:
-    """The answer of a method, in whatever form it gave it. Its own errors pass through."""
+def _call(task: Task) -> Callable[[InterfaceProblem], Answer]:
+    """A method ready to be called, which answers in whatever form. Its own errors pass through."""
     spec, usual = task.run.method, task.run.setting == "default"
     plugin = _kept.plugins.find(spec.name) if spec.foreign else None
     given: dict[str, Any] = {
@@ -159,19 +179,27 @@ def _called(task: Task, problem: InterfaceProblem) -> Answer:
             method = plugin.make(**spec.settings)
         if usual:
             del given["tol"]
-        s = solve(problem, method, **given)
-        return _of_solution(s, s.method, s.seconds["solve"])
-    wanted = inspect.signature(plugin.make).parameters
+
+        def solved(problem: InterfaceProblem) -> Answer:
+            s = solve(problem, method, **given)
+            return _of_solution(s, s.method, s.seconds["solve"])
+
+        return solved
+    make, wanted = plugin.make, inspect.signature(plugin.make).parameters
     passed = {name: given[name] for name in PASSED if name in wanted and name not in spec.settings}
     if usual and "tol" in passed and wanted["tol"].default is not inspect.Parameter.empty:
         del passed["tol"]
-    answer = plugin.make(problem, **passed, **spec.settings)
+    return lambda problem: _read(make(problem, **passed, **spec.settings), spec.label)
+
+
+def _read(answer: Any, label: str) -> Answer:
+    """What a plug-in's function returned, in whatever form."""
     if isinstance(answer, Answer):
-        return replace(answer, label=spec.label)
+        return replace(answer, label=label)
     if isinstance(answer, Solution):
-        return _of_solution(answer, spec.label)
+        return _of_solution(answer, label)
     reactions, multipliers = answer if isinstance(answer, tuple) else (answer, None)
-    return Answer(Status.SOLVED.label, "", reactions, multipliers, spec.label)
+    return Answer(Status.SOLVED.label, "", reactions, multipliers, label)
 
 
 def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Answer:
@@ -223,6 +251,18 @@ def _thinned(history: Sequence[Mapping[str, float]] | None) -> Any:
     return residuals, seconds, [int(i) + 1 for i in index]
 
 
+def _running_cpu() -> float:
+    """CPU time of the processes that were started here and run [s], or ended without notice."""
+    import psutil
+
+    seconds = 0.0
+    for child in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            used = child.cpu_times()
+            seconds += used.user + used.system
+    return seconds
+
+
 def _reset_peak() -> float:
     """Forget the largest resident memory so far; the present one [MB]."""
     with suppress(OSError), open("/proc/self/clear_refs", "w") as file:
@@ -239,8 +279,6 @@ def _memory(field: str) -> float:
 
 def _limit_memory(gigabytes: float) -> None:
     """Bound the data of this process, and all that is mapped beyond what it holds now."""
-    import resource
-
     import psutil
 
     size = int(gigabytes * 1e9)

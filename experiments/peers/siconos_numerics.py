@@ -1,18 +1,37 @@
-"""Siconos (INRIA): the solvers NSGS, PROX, ADMM and NSN_AC of its library of numerics.
+"""Siconos (INRIA): the solvers of its library of numerics, in the plane and in space.
 
-Installed by `apt-get install python3-siconos`. Problems of the plane get a second tangent along
-which nothing moves, so that the same solvers take them. Q goes over in sparse blocks.
+Installed by `apt-get install python3-siconos`. A problem of the plane goes to the solver of the
+plane of that name, with Q as a dense matrix. The names that Siconos has in space only get such a
+problem with a second tangent along which nothing moves. In space Q goes over in sparse blocks.
 Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction.
 """
 
+from contactopt import InputError
 from contactopt.benchmark import Peer, method
+
+SOLVERS = {
+    2: ("NSGS", "CPG", "LEMKE"),
+    # Gauss-Seidel and proximal points; ADMM; Newton; projections; Tresca and Panagiotopoulos
+    3: ("NSGS", "PROX", "ADMM", "NSN_AC", "NSN_AC_TEST", "NSN_FB", "NSN_NM", "VI_EG", "VI_FPP",
+        "EG", "FPP", "HP", "DSFP", "TFP", "PFP", "ACLMFP"),
+}  # fmt: skip
 
 
 def version():
+    import subprocess
+
     import siconos
     import siconos.numerics
 
-    return siconos.version
+    def said(*command):
+        try:
+            return subprocess.run(["dpkg-query", *command], capture_output=True, text=True).stdout
+        except OSError:  # no Debian
+            return ""
+
+    # Debian's 4.4.0 calls itself 4.5.0: the package knows better
+    package = said("-S", siconos.__file__).partition(":")[0]
+    return (said("-W", "-f", "${Version}", package) if package else "") or siconos.version
 
 
 def prepare(problem, tol, settings):
@@ -22,7 +41,16 @@ def prepare(problem, tol, settings):
     import siconos.numerics as sn
 
     q, blocks, columns = problem["q"], problem["data"], problem["indices"]
-    k, size, number = len(q), q.size, len(columns)
+    (k, dim), size, number = q.shape, q.size, len(columns)
+    options = sn.SolverOptions(getattr(sn, f"SICONOS_FRICTION_{dim}D_" + settings["solver"]))
+    options.dparam[sn.SICONOS_DPARAM_TOL] = tol
+    options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = 1000000
+    if dim == 2:
+        Q = np.zeros((k, k, 2, 2))
+        Q[np.repeat(np.arange(k), np.diff(problem["indptr"])), columns] = blocks
+        Q = np.asfortranarray(Q.swapaxes(1, 2).reshape(size, size))
+        made = sn.FrictionContactProblem(2, k, Q, q.ravel(), problem["mu"])
+        return sn.fc2d_driver, made, np.zeros(size), np.zeros(size), options
     ends = 3 * np.arange(1, k + 1)
     numbers = [3, k, 1, size, size, number, k, k, *ends, *ends, k + 1, number]
     numbers += [*problem["indptr"], *columns]
@@ -33,17 +61,14 @@ def prepare(problem, tol, settings):
         file.write("\n".join(map(str, numbers)))
         file.flush()
         made = sn.frictionContact_new_from_filename(file.name)
-    options = sn.SolverOptions(getattr(sn, "SICONOS_FRICTION_3D_" + settings["solver"]))
-    options.dparam[sn.SICONOS_DPARAM_TOL] = tol
-    options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = 1000000
-    return made, np.zeros(size), np.zeros(size), options
+    return sn.fc3d_driver, made, np.zeros(size), np.zeros(size), options
 
 
 def solve(prepared):
     import siconos.numerics as sn
 
-    made, r, v, options = prepared
-    info = sn.fc3d_driver(made, r, v, options)
+    driver, made, r, v, options = prepared
+    info = driver(made, r, v, options)
     return r, info == 0, options.iparam[sn.SICONOS_IPARAM_ITER_DONE]
 
 
@@ -54,4 +79,8 @@ PEER = Peer("Siconos", "apt-get install python3-siconos", ["python3", "/usr/bin/
 @method(peer=PEER)
 def siconos(problem, tol=1e-8, time_limit=10.0, solver="NSGS"):
     """One of Siconos' solvers on the dimensionless problem."""
-    return PEER.answer(problem, tol, time_limit, solver=solver)
+    dims = [dim for dim, names in SOLVERS.items() if solver in names]
+    if not dims:
+        names = sorted({name for known in SOLVERS.values() for name in known})
+        raise InputError(f"unknown solver of Siconos {solver!r}; choose from {', '.join(names)}.")
+    return PEER.answer(problem, tol, time_limit, dims, solver=solver)
