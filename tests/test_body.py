@@ -4,10 +4,22 @@ import skfem
 from conftest import MATERIAL, block, two_blocks
 from skfem.helpers import ddot, sym_grad, trace
 
-from contactopt import BodyForce, InputError, Material, Part, Plate, Scene, Support, Traction
+from contactopt import (
+    BodyForce,
+    InputError,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    reduce,
+)
 from contactopt.bodies.body import build_body
 from contactopt.bodies.elements import weight_at
 from contactopt.material import lame
+from contactopt.meshes.cells import split_twice
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
 
@@ -209,3 +221,26 @@ def test_negative_radius_is_refused():
 def test_bad_materials_are_refused(E, nu):
     with pytest.raises(InputError, match="must be a finite number"):
         Material(E, nu)
+
+
+def test_tetrahedra_that_split_a_common_side_differently_are_refused():
+    """Two cubes of six tetrahedra whose common square has one diagonal from each side."""
+    cube = skfem.MeshTet.init_tensor([0.0, 1.0], [0.0, 1.0], [0.0, 1.0])
+    x, y, z = cube.p
+    other = skfem.MeshTet(np.stack([2 - x, y, z]), cube.t)
+    turned = skfem.MeshTet(np.stack([1 + x, y, 1 - z]), cube.t)
+    assert split_twice(cube) is None and split_twice(joined_meshes(cube, other)) is None
+    found = split_twice(joined_meshes(cube, turned))
+    assert np.allclose(found, [1.0, 0.5, 0.5])
+    named = joined_meshes(cube, turned).with_boundaries({"contact": lambda x: x[2] == 0})
+    part = Part("b", named, Material(1.0, 0.3))
+    with pytest.raises(InputError, match=r"different diagonals, at \(1, 0.5, 0.5\)"):
+        reduce(Scene("s", part, Rigid("floor"), 0.3, "solid"))
+
+
+def joined_meshes(one, other):
+    """Of both, with common nodes."""
+    points = np.concatenate([one.p, other.p], axis=1)
+    t = np.concatenate([one.t, other.t + one.p.shape[1]], axis=1)
+    p, number = np.unique(points.round(9), axis=1, return_inverse=True)
+    return skfem.MeshTet(p, np.ravel(number)[t])

@@ -28,7 +28,7 @@ from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.bodies.thickness import thin_facets
 from contactopt.errors import InputError
-from contactopt.meshes.cells import SHAPES, joined, overlapping, straight
+from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part, Plate, Scene, Traction
 
@@ -114,6 +114,12 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     if not np.all(np.isfinite(mesh.p)):
         raise InputError(
             f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers."
+        )
+    if (middle := split_twice(mesh)) is not None:
+        place = ", ".join(f"{x:g}" for x in middle)
+        raise InputError(
+            f"body '{part.name}': tetrahedra split a quadrilateral along different diagonals, at"
+            f" ({place}), and share no side there; mesh this place anew."
         )
     _check_pieces(part, mesh)
     if (over := overlapping(mesh)) is not None:

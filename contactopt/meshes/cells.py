@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import skfem
 from scipy.sparse import coo_matrix
@@ -113,6 +115,31 @@ def overlapping(mesh: skfem.Mesh) -> int | None:
         sides.append(np.sum(normals * (mesh.p[:, across] - mesh.p[:, corners[0]]), axis=0))
     over = inner[sides[0] * sides[1] > 0]
     return int(mesh.f2t[0, over[0]]) if len(over) else None
+
+
+def split_twice(mesh: skfem.Mesh) -> np.ndarray | None:
+    """The middle (3,) of a quadrilateral inside a body that tetrahedra split along different
+    diagonals, so that they share its corners but no side; None without any.
+    """
+    if len(mesh.p) != 3 or len(mesh.t) != 4:
+        return None
+    facets = mesh.facets[:, mesh.boundary_facets()]
+    edges = np.sort(facets[[[0, 1, 2], [1, 2, 0]]], axis=0).reshape(2, -1)
+    apart = np.concatenate([facets[2], facets[0], facets[1]])  # from each edge
+    order = np.lexsort(edges)
+    edges, apart = edges[:, order], apart[order]
+    same = np.flatnonzero(np.all(edges[:, 1:] == edges[:, :-1], axis=0))
+    quads = np.sort(np.concatenate([edges[:, same], [apart[same], apart[same + 1]]]), axis=0)
+    known, count = np.unique(quads, axis=1, return_counts=True)
+    known = known[:, count > 1]
+    if not known.size:
+        return None
+    sides = set(map(tuple, np.sort(facets, axis=0).T.tolist()))
+    cells = set(map(tuple, np.sort(mesh.t, axis=0).T.tolist()))
+    for quad in map(tuple, known.T.tolist()):
+        if quad not in cells and sides.issuperset(combinations(quad, 3)):
+            return np.asarray(mesh.p[:, quad].mean(axis=1))
+    return None
 
 
 def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
