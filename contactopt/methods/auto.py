@@ -1,24 +1,27 @@
-"""The default, without a number to choose: Newton's method, and where it fails interior points,
-then the proximal loop.
+"""The default, without a number to choose: Newton's method, and where it fails cones, then the
+proximal loop.
 
 0. Where the problem has no plates, and the package was installed with a compiler: FIRST_SWEEPS
    sweeps of the nonsmooth Gauss-Seidel method, accelerated after Anderson, if they cost little.
-   Where stage 1 fails, the sweeps go on for twice as long. Where Q is a convolution,
+   Where stages 1 and 2 fail, the sweeps go on for twice as long. Where Q is a convolution,
    as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
    circle near a solution, a few proximal steps break out of it.
-2. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
+2. Where Q is sparse and singular: the proximal loop, as long as its subproblems are easy and each
+   of them halves the residual.
+3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
    A tree over the states of the contacts looks for a solution or for such a proof
    (contactopt.methods.kernels.states), BRANCHES of it here, and twice as many after each round of
-   stages 3 and 4.
-3. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
+   stages 5 and 6.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
+5. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
    early says nothing of the next; then the proximal loop from the best of all points, its weight
    falling slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved
    the residual, the same again on other paths, with twice the patience.
-4. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
+6. Else the proximal loop from the best point. When ROUND outer iterations have not halved the
    residual, twice as many after each restart, the loop starts again from contact forces drawn at
    random (fixed seed, so that runs repeat) and larger than those of the point it leaves: strong
    friction may have solutions that repel the loop and others that attract it.
@@ -36,7 +39,7 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.errors import InputError
+from contactopt.errors import BackendError, InputError
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import InterfaceOperator
@@ -192,7 +195,9 @@ class _Robust:
         problem = self.problem
         if self.loose and start is not None:
             reached = yield from self.proximal(start, constants.POLISH, constants.LEAST_ALPHA)
-        elif not self.loose:
+        elif self.loose:
+            reached = yield from self.proximal(reached, 1, constants.EAGER_ALPHA, "eager")
+        else:
             residual = coulomb_equations(problem).evaluate(*reached)[0]
             if residual <= constants.NEARBY * np.linalg.norm(reached[0]):
                 reached = yield from self.proximal(
@@ -200,10 +205,14 @@ class _Robust:
                 )
         yield from self.swept.points(constants.MORE_SWEEPS, np.inf)
         if self.conic:
-            reached = yield from self.interior(reached, interior_iterates(problem, self.matrix))
+            for full in (True, False):
+                path = interior_iterates(problem, self.matrix, Path(full))
+                reached = yield from self.interior(reached, path)
         if infeasibility(problem) is not None:  # the driver says so
             return
         yield from self.searched(constants.BRANCHES)
+        if self.conic and problem.symmetric and not self.loose:
+            reached = yield from self.cones(reached)
         yield from self.jammed(reached) if self.loose else self.restarted(reached)
 
     def searched(self, branches: int) -> Iterator[Iterate | Known]:
@@ -243,6 +252,19 @@ class _Robust:
             reached = self.better(reached, last)
             note(logger, NO_PROGRESS_JAMMED)
             yield from self.searched(constants.BRANCHES * 2 ** (restarts + 1))
+
+    def cones(self, start: Iterate) -> Generator[Iterate | Known, None, Iterate]:
+        """A few cone programs."""
+        evaluate = coulomb_equations(self.problem).evaluate
+        points = ((point, evaluate(*point)[0]) for point in AcaryCadoux().iterate(self.problem))
+        try:
+            found, residual = yield from _followed(
+                points, lambda steps, since: steps >= constants.CONE_PROGRAMS
+            )
+        except BackendError as error:  # no answer: the proximal loop needs none
+            note(logger, f"the cone programs of the default method gave no answer: {error}")
+            return start
+        return found if found is not None and residual < evaluate(*start)[0] else start
 
     def interior(
         self, start: Iterate, points: Iterator[tuple[Iterate, float]]

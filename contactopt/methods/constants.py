@@ -25,6 +25,7 @@ PROGRESS = 0.9  # a residual that falls by less than this factor is no progress
 BRANCHES = 300  # of the tree over the states of the contacts, at first
 MOST_STATES = {2: 100, 3: 10}  # contacts up to which it is tried, by the dimension
 BRANCH_WORK = 3e7  # branches at a time, times the cube of the contacts, which each costs
+CONE_PROGRAMS = 5  # of the fixed point of Acary and Cadoux
 CLOSE = 1e-3  # error of an interior point from which the proximal loop finds the last digits
 LEAST_ALPHA = 1e-4  # weight with which it begins there
 # residual of Newton's best point, over its forces, from which the proximal loop goes on at once
@@ -33,6 +34,7 @@ POLISH = 10  # proximal steps for the last digits, each so many of which must ha
 ROUND = 20  # outer iterations of the first proximal loop that must halve the residual
 SPARSE_ROUND = 100  # of the first of a sparse Q, where random forces lead nowhere
 PATHS = 3  # interior-point paths drawn at random before each proximal loop of a sparse Q
+EAGER_ALPHA = 1e-2  # weight with which the eager loop begins
 GENTLE_ALPHA = 0.1  # weight with which the gentle loop begins
 LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 
@@ -41,6 +43,7 @@ LARGER = 3.0  # random starts, over the root-mean-square force of the point left
 FALL, RISE = 5.0, 8.0
 GENTLE_FALL, GENTLE_RISE = 1.5, 3.0
 EASY = 6
+EAGER_STEPS = 10  # Newton steps of a subproblem of the eager loop, which ends with a harder one
 
 # Its subproblems (contactopt.methods.kernels.sparse_newton).
 SUBPROBLEM_STEPS = 15  # Newton steps of one of them
@@ -66,9 +69,11 @@ INTERIOR_PROGRESS = 0.9  # an error that falls by less than this factor is no pr
 START = 100.0  # size of the first point in both cones, over dimensionless forces of order one
 LEAST_SMOOTHING, MOST_SMOOTHING = 0.03, 0.3  # of the friction of random paths
 PREDICTED = 0.99  # way of a predictor to the boundary of the cones
-BOUNDARY = 0.9  # way of a step to the boundary
+BOUNDARY, SHORT = 0.98, 0.9  # way of a step to the boundary; the same with |u_t| linearised
+STUCK = 0.3  # a step shorter than this is no Newton step; the next one leaves |u_t| as it is
 CORRECTED = 0.1  # a predictor shorter than this has no second-order correction
 LEAST_CENTERING, MOST_CENTERING = 1e-4, 0.95  # bounds of the centring of a step
+STUCK_CENTERING = 0.1  # the lower bound after a step that was stuck
 CENTRAL = 1e-3  # least eigenvalue of x o z at a contact, over the mean
 CENTRAL_KEPT = 0.5  # share of this eigenvalue that a step keeps where it is less
 BACKTRACK = 0.8  # factor by which a step is shortened until it is so

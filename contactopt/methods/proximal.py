@@ -28,7 +28,7 @@ from contactopt.problem import InterfaceProblem
 
 # of the proximal term; where even the largest fails, the loop ends
 LEAST_WEIGHT, LARGEST_WEIGHT = 1e-12, 1e6
-Pace = Literal["steady", "gentle"]
+Pace = Literal["steady", "gentle", "eager"]
 
 
 @dataclass(frozen=True)
@@ -58,12 +58,23 @@ def proximal_iterates(
     Newton's method left it at. `matrix` is the problem's Q, ready for block systems.
 
     `alpha` is the first weight of the proximal term. It changes slowly at the pace `gentle`, so
-    that few subproblems fail: for problems on which every smaller alpha soon fails.
+    that few subproblems fail: for problems on which every smaller alpha soon fails. The loop of the
+    pace `eager` ends with the first subproblem that is not solved in few steps.
     """
-    most = constants.SUBPROBLEM_STEPS
-    fall, rise, easy = {
-        "steady": (constants.FALL, constants.RISE, most),
-        "gentle": (constants.GENTLE_FALL, constants.GENTLE_RISE, constants.EASY),
+    fall, rise, easy, most = {
+        "steady": (
+            constants.FALL,
+            constants.RISE,
+            constants.SUBPROBLEM_STEPS,
+            constants.SUBPROBLEM_STEPS,
+        ),
+        "gentle": (
+            constants.GENTLE_FALL,
+            constants.GENTLE_RISE,
+            constants.EASY,
+            constants.SUBPROBLEM_STEPS,
+        ),
+        "eager": (constants.FALL, np.inf, constants.EAGER_STEPS, constants.EAGER_STEPS),
     }[pace]
     while alpha < LARGEST_WEIGHT:
         equations = coulomb_equations(problem, point[0], alpha)

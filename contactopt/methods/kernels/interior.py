@@ -41,12 +41,15 @@ class Path:
 
     On jammed packings many paths end early, and another one does not.
 
+    full    |u_t| is linearised in every step, with shorter steps; else not after a step that had to
+            be short
     smooth  |u_t| is replaced by (|u_t|^2 + (smooth z_n)^2)^1/2, which has no kink where a contact
             begins to slip the other way; its derivative by z_n is left out. The end of the path is
             a solution but for terms of order smooth^2
     first   r_n mu and z_n / mu of the first point, (2,) or one for every contact, (2, k)
     """
 
+    full: bool = True
     smooth: float = 0.0
     first: np.ndarray = field(default_factory=lambda: np.full((2, 1), constants.START))
 
@@ -162,18 +165,20 @@ def interior_iterates(
         best = min(best, error)
         if error < NEAR or since >= constants.STALLED or not np.isfinite(error):
             return
-        slopes = np.zeros_like(z)  # of |u_t| = |z_t|
-        slopes[cones.rough, 1:] = (z[:, 1:] / slip[:, None])[cones.rough]
+        bent, slopes = path.full or length > constants.STUCK, np.zeros_like(z)
+        if bent:  # linearise |u_t| = |z_t|
+            slopes[cones.rough, 1:] = (z[:, 1:] / slip[:, None])[cones.rough]
         system = cones.linearised(x, z, slopes)
-        step = None if system is None else _centred_step(system, gap)
+        step = None if system is None else _centred_step(system, gap, bent)
         if system is None or step is None:
             return
-        length = _way(system.scaling, step[0], step[1], constants.BOUNDARY)
+        boundary = constants.SHORT if path.full else constants.BOUNDARY
+        length = _way(system.scaling, step[0], step[1], boundary)
         x, z, lam = x + length * step[0], z + length * step[1], lam + length * step[2]
 
 
 def _centred_step(
-    system: System, gap: np.ndarray
+    system: System, gap: np.ndarray, bent: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Mehrotra's predictor and corrector with one factorisation."""
     scaling = system.scaling
@@ -186,8 +191,8 @@ def _centred_step(
     length = min(1.0, constants.PREDICTED * scaling.longest(first[0], first[1]))
     # The better the predictor, the less the next step is centred.
     ahead = float(np.vdot(x + length * first[0], z + length * first[1])) / k
-    centering = min(max(ahead / mean, 0.0), 1.0) ** 3
-    centering = min(max(centering, constants.LEAST_CENTERING), constants.MOST_CENTERING)
+    least = constants.LEAST_CENTERING if bent else constants.STUCK_CENTERING
+    centering = min(max(min(max(ahead / mean, 0.0), 1.0) ** 3, least), constants.MOST_CENTERING)
     # Corrector: the same system with the centring and the second-order term of the predictor.
     second = scaling.corrector(first[0], first[1]) if length > constants.CORRECTED else 0.0
     return system.direction(gap, unbalanced, centering * mean * scaling.inverse - z - second)
