@@ -13,10 +13,10 @@ proximal loop.
 3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
-   A tree over the states of the contacts looks for a solution or for such a proof
-   (contactopt.methods.kernels.states), BRANCHES of it here, and twice as many after each round of
-   stages 5 and 6.
-4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point.
+4. Where Q is a symmetric array: CONE_PROGRAMS iterations of the Acary-Cadoux fixed point. Then a
+   tree over the states of the contacts looks for a solution or for a proof that there is none
+   (contactopt.methods.kernels.states), with TREE_WORK, and twice as much after each round of stages
+   5 and 6.
 5. Where Q is sparse and singular: PATHS interior-point paths drawn at random, since one that ends
    early says nothing of the next; then the proximal loop from the best of all points, its weight
    falling slowly: jammed packings need hundreds of steps. When SPARSE_ROUND of them have not halved
@@ -33,7 +33,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
-from itertools import count, islice
+from itertools import count
 from typing import ClassVar
 
 import numpy as np
@@ -210,20 +210,22 @@ class _Robust:
                 reached = yield from self.interior(reached, path)
         if infeasibility(problem) is not None:  # the driver says so
             return
-        yield from self.searched(constants.BRANCHES)
         if self.conic and problem.symmetric and not self.loose:
             reached = yield from self.cones(reached)
+        yield from self.searched(constants.TREE_WORK)
         yield from self.jammed(reached) if self.loose else self.restarted(reached)
 
-    def searched(self, branches: int) -> Iterator[Iterate | Known]:
-        """The points among the next branches of the tree; NoSolution if it ends without any."""
+    def searched(self, work: float) -> Iterator[Iterate | Known]:
+        """The points that so much work on the tree finds; NoSolution if it ends without any."""
         if self.tree is None or self.tree.done:
             return
-        branches = min(branches, int(constants.BRANCH_WORK / self.problem.contacts**3))
-        for found in islice(self.branches, branches):
+        end = self.tree.work + work
+        for found in self.branches:
             if found is not None:
                 self.met = True
                 yield from self.proximal(found[:2], constants.POLISH, constants.LEAST_ALPHA)
+            if self.tree.work > end:
+                return
         if self.tree.done and not self.met:
             raise NoSolution(self.tree.proof)
 
@@ -237,7 +239,7 @@ class _Robust:
             r *= constants.LARGER * np.sqrt(np.mean(last[0] ** 2)) or 1.0
             reached = self.problem.law.nearest(r, r[:, 0]), last[1]
             note(logger, "the proximal loop got nowhere and started again from random forces")
-            yield from self.searched(constants.BRANCHES * 2 ** (restarts + 1))
+            yield from self.searched(constants.TREE_WORK * 2 ** (restarts + 1))
 
     def jammed(self, reached: Iterate) -> Generator[Iterate | Known, None, None]:
         """Paths drawn at random and the gentle proximal loop from the best point, without end."""
@@ -251,7 +253,7 @@ class _Robust:
             last = yield from self.proximal(reached, patience, constants.GENTLE_ALPHA, "gentle")
             reached = self.better(reached, last)
             note(logger, NO_PROGRESS_JAMMED)
-            yield from self.searched(constants.BRANCHES * 2 ** (restarts + 1))
+            yield from self.searched(constants.TREE_WORK * 2 ** (restarts + 1))
 
     def cones(self, start: Iterate) -> Generator[Iterate | Known, None, Iterate]:
         """A few cone programs."""

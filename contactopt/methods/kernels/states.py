@@ -36,6 +36,7 @@ ZERO = 1e-9  # of a dimensionless problem: what is smaller counts as zero
 PIVOT = 1e-8  # least pivot
 EXACT = 1e-10  # relative size of what rounding leaves of a zero in a contradiction
 MARGIN = 1e-7  # least constant of a contradiction, over the size of its terms
+BRANCH = 3e5  # entries that pivots change in the time that the rest of a branch takes
 FRESH = 50  # pivots after which a tableau is made anew from the data
 SAME = 1e-7  # relative size of what counts as zero when a point is given its states
 HALVED = 4  # how often an arc of 90 degrees is halved
@@ -114,11 +115,13 @@ class StateTree:
     """The tree of a dimensionless problem of Coulomb's law whose Q is an array.
 
     done      whether all branches have been looked at
-    branches  how many of them so far
+    branches  how many of them so far;   work  entries of tableaus that pivots have changed, with
+              BRANCH for each branch
     """
 
     def __init__(self, problem: InterfaceProblem):
         self.problem, self.branches, self.done, self.least = problem, 0, False, np.inf
+        self.work = 0.0
         (k, dim), p, mu = problem.q.shape, len(problem.s), problem.mu
         self.n = n = k * dim
         self.unit, self.K = np.eye(n + p), np.hstack([problem.Q, problem.V])
@@ -164,6 +167,7 @@ class StateTree:
             check_time()
             branch = waiting.pop()
             self.branches += 1
+            self.work += BRANCH
             if not self.feasible(branch):
                 yield None
                 continue
@@ -265,6 +269,8 @@ class StateTree:
             if len(rows) == 0:
                 return True
             careful = branch.pivots > patience  # the least index cannot go round in a circle
+            if branch.pivots > 2 * patience:  # but for very long
+                return True
             i = int(rows[np.argmin(branch.basic[rows])] if careful else np.argmax(wrong))
             row = branch.T[i, :-1] * (1.0 if right[i] > 0 else -1.0)
             either = (branch.other >= self.n) & (branch.other < self.n + len(self.problem.s))
@@ -273,6 +279,7 @@ class StateTree:
             if len(usable):
                 least = np.argmin(branch.other[usable]) if careful else np.argmax(row[usable])
                 branch.pivot(i, int(usable[least]))
+                self.work += branch.T.size
             elif self.contradicts(branch, i):
                 return False
             elif fresh:
