@@ -1,0 +1,1 @@
+"""Random pairs of surfaces of every kind, each asked for a constant pressure."""
