@@ -259,16 +259,19 @@ def report(options: argparse.Namespace) -> int:
 
 def list_names(options: argparse.Namespace) -> int:
     """Print everything that can be chosen by its name."""
-    from contactopt.cli.completion import NAMES
+    from contactopt.cli.completion import NAMES, table
     from contactopt.methods.backends import CONIC, QP
 
-    _print_names("scenes", NAMES["scene"])
+    paths = table("scenes", "PATHS")
+    scenes = table("scenes", "SCENES").items()
+    _print_names("scenes", {name: what + " (load path)" * (name in paths) for name, what in scenes})
     _print_names("materials of scene files", NAMES["material"])
-    _print_names("laws of contact", NAMES["law"])
-    _print_names("methods", NAMES["method"])
+    _print_names("laws of contact", table("problem.laws", "LAWS"))
+    _print_names("methods", table("methods", "METHODS"))
     print("forms of the interface operator Q: " + ", ".join(NAMES["Q"]))
-    print("solvers of the bodies: " + ", ".join(NAMES["solver"]))
-    _print_names("preconditioners of the interface operator", NAMES["preconditioner"])
+    print("solvers of the bodies: " + ", ".join(["auto", *table("bodies.solvers", "SOLVERS")]))
+    of_Q = table("methods.preconditioners", "PRECONDITIONERS")
+    _print_names("preconditioners of the interface operator", of_Q)
     for title, backends in (
         ("QP backends (normal; tangential in 2D)", QP),
         ("conic backends (tangential in 3D)", CONIC),
@@ -284,8 +287,7 @@ def _print_names(title: str, names: Mapping[str, str]) -> None:
     print(title)
     wide = max(map(len, names))
     for name, what in names.items():
-        if what:
-            print(f"  {name:{wide}} {what}")
+        print(f"  {name:{wide}} {what}")
 
 
 def completion(options: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ fish:  contactopt completion fish > ~/.config/fish/completions/contactopt.fish
 from __future__ import annotations
 
 import argparse
+import ast
 import json
 from importlib.resources import files
 
@@ -17,6 +18,23 @@ from importlib.resources import files
 NAMES: dict[str, dict[str, str]] = json.loads(
     files("contactopt.cli").joinpath("names.json").read_text("utf-8")
 )
+
+
+def table(room: str, name: str) -> dict[str, str]:
+    """The names in a table of a room, and what each is, read from the source without importing it:
+    rows are (module, name, what it is, ...).
+    """
+    home = files("contactopt").joinpath(*room.split("."), "__init__.py")
+    for node in ast.parse(home.read_text("utf-8")).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        if any(isinstance(one, ast.Name) and one.id == name for one in targets):
+            rows = zip(node.value.keys, node.value.values)  # type: ignore[attr-defined]
+            return {key.value: _third(value) for key, value in rows}
+    raise LookupError(f"{room} has no table {name}")
+
+
+def _third(row: ast.Tuple) -> str:
+    return str(getattr(row.elts[2], "value", "")) if len(row.elts) > 2 else ""
 
 
 def script(parser: argparse.ArgumentParser, shell: str) -> str:
