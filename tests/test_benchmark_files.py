@@ -1,9 +1,11 @@
 """Files of `contactopt run`: names, earlier files, interruptions, numbers that no machine holds."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 import pytest
@@ -55,7 +57,9 @@ def test_a_folder_used_again_keeps_nothing_of_the_run_before(tmp_path):
 
 
 def test_an_interrupted_run_leaves_nothing(tmp_path):
-    """Ctrl-C at several moments from the start on: exit code 130, one last line, and no file."""
+    """Ctrl-C at several moments from the start on: exit code 130, one last line, and either all
+    files or none.
+    """
     for number, wait in enumerate((0.3, 1.0, 2.0)):
         out = tmp_path / f"out{number}" / "below"
         command = [
@@ -79,7 +83,31 @@ def test_an_interrupted_run_leaves_nothing(tmp_path):
         if process.returncode != 0 and said:  # it may have been done
             assert process.returncode == 130, said
             one_line(said, "interrupted")
-            assert not os.path.exists(out.parent)
+            if out.parent.exists():  # it came after the files had been moved there
+                names = sorted(file.name for file in out.iterdir())
+                assert "summary.json" in names and "interface.npz" in names, names
+                assert names[0][0] != ".", names
+
+
+@pytest.mark.parametrize("step", ["tempfile.mkdtemp", "os.replace", "shutil.rmtree"])
+def test_ctrl_c_while_files_are_moved_leaves_all_or_none(step, tmp_path, monkeypatch):
+    real = {"mkdtemp": tempfile.mkdtemp, "replace": os.replace, "rmtree": shutil.rmtree}[
+        step.split(".")[1]
+    ]
+
+    def interrupted(*given, **named):
+        signal.raise_signal(signal.SIGINT)
+        return real(*given, **named)
+
+    monkeypatch.setattr(step, interrupted)
+    out = tmp_path / "new" / "out"
+    with pytest.raises(KeyboardInterrupt), whole_folder(out) as folder:
+        (folder / "a").write_text("1")
+        (folder / "b").write_text("2")
+    if step == "tempfile.mkdtemp":
+        assert not out.parent.exists()
+    else:
+        assert sorted(file.name for file in out.iterdir()) == ["a", "b"]
 
 
 def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):

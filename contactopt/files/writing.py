@@ -11,6 +11,7 @@ import os
 import shutil
 import signal
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -56,19 +57,20 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     operating system refuses to write.
     """
     out = Path(out)
-    made: list[Path] = []
+    missing = [path for path in (out, *out.parents) if not path.exists()]  # innermost first
     try:
-        made = _make_folder(out)
+        out.mkdir(parents=True, exist_ok=True)
         with _staging(out) as staging:
             yield staging
-            written = sorted(staging.iterdir())
-            for file in written:
-                os.replace(file, out / file.name)
-            remove_files(out, set(stale) - {file.name for file in written})
+            with _ctrl_c_waits():
+                written = sorted(staging.iterdir())
+                for file in written:
+                    os.replace(file, out / file.name)
+                remove_files(out, set(stale) - {file.name for file in written})
     except OSError as error:
         raise _unwritable(out, error) from error
     finally:
-        for folder in made:
+        for folder in missing:
             with suppress(OSError):  # it holds something
                 folder.rmdir()
 
@@ -103,21 +105,39 @@ def _staging(folder: Path) -> Iterator[Path]:
         with suppress(OSError):
             if time.time() - old.stat().st_mtime > OLD:
                 shutil.rmtree(old)
-    with tempfile.TemporaryDirectory(prefix=".contactopt-", dir=folder) as staging:
+    staging = None
+    try:
+        with _ctrl_c_waits():
+            staging = tempfile.mkdtemp(prefix=".contactopt-", dir=folder)
         yield Path(staging)
+    finally:
+        if staging is not None:
+            with _ctrl_c_waits():
+                shutil.rmtree(staging, ignore_errors=True)
+
+
+@contextmanager
+def _ctrl_c_waits() -> Iterator[None]:
+    """An interrupt within this block is heeded when the block ends, so that its steps are made all
+    or none. Only Python's main thread can be interrupted.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pressed: list[int] = []
+    heed = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, heed or signal.SIG_DFL)
+        if pressed:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _unwritable(out: Path, error: OSError) -> InputError:
     return InputError(
         f"cannot write into '{out}': {error.strerror or error}; choose another output directory."
     )
-
-
-def _make_folder(folder: Path) -> list[Path]:
-    """Make the folder and those above it; the ones that were missing, innermost first."""
-    missing = [path for path in (folder, *folder.parents) if not path.exists()]
-    folder.mkdir(parents=True, exist_ok=True)
-    return missing
 
 
 def remove_files(folder: Path, names: Iterable[str]) -> None:
