@@ -27,7 +27,7 @@ from contactopt.readings.chords import chord_remarks
 from contactopt.readings.corners import corner_remarks
 from contactopt.readings.peaks import pressure_reading
 from contactopt.readings.plate_motions import approach
-from contactopt.readings.plausibility import doubts
+from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
@@ -133,6 +133,7 @@ def _run(
     options, changes = choose(changes, {} if file is None else file.solve)
     _check_output(out, options)
     states = _states(scene, file, changes)
+    of_meshes = said_of_meshes(states[-1])
     name = options.method or default_method(options.settings)
     method = find_method(name, **options.settings)
     method.backends(states[-1].dim)  # refused before any work if one of them cannot be used
@@ -149,7 +150,7 @@ def _run(
         if solved is None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
         names = (name, *method.backends(states[-1].dim))
-        result = _result(solved, estimate, names, told())
+        result = _result(solved, estimate, names, (*of_meshes, *told()))
         if options.read:
             from contactopt.accuracy.indicators import read_once  # with the room of derivatives
 

@@ -46,6 +46,11 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
     A = isotropic_stiffness(basis, kind.constants(part.material), weight)
     fixed = _constrained(scene, part, basis)
+    if fixed.held.all():
+        raise InputError(
+            f"body '{part.name}' is held at all its nodes, so that nothing of it deforms; hold"
+            " fewer, or make it a rigid body."
+        )
     rigid_motions = free_motions(kind, basis, fixed.held, weight)
     check_free(part.name, A, rigid_motions)
     traces = {}
