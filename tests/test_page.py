@@ -250,7 +250,8 @@ UNCUT = """(() => {
   const words = [...document.querySelectorAll(".chart text")];
   const inside = (text) => {
     const a = text.getBoundingClientRect(), b = text.closest("svg").getBoundingClientRect();
-    return a.left >= b.left - 1 && a.right <= b.right + 1 && a.top >= b.top - 1 && a.bottom <= b.bottom + 1;
+    const across = a.left >= b.left - 1 && a.right <= b.right + 1;
+    return across && a.top >= b.top - 1 && a.bottom <= b.bottom + 1;
   };
   return words.every(inside) ? words.length : -1;
 })()"""
@@ -311,8 +312,10 @@ def test_the_slider_moves_the_bodies_and_any_column_of_the_history_is_drawn(fold
         assert words.startswith("state 1 of ")
         browser.ask(change.format("upward", "elastic_energy", "change"))
         # heights of the dots in the chart are linear in the column of the history
-        ask = "[...document.querySelectorAll('#path-chart circle')].map((dot) => +dot.getAttribute('cy'))"
-        drawn = np.array(browser.ask(ask))[:-1]  # without that of the state shown
+        dots = "[...document.querySelectorAll('#path-chart circle')]"
+        drawn = np.array(browser.ask(f"{dots}.map((dot) => +dot.getAttribute('cy'))"))[
+            :-1
+        ]  # without that of the state shown
         energy = data_of(folder / "path" / "view.html")["history"]["elastic_energy"]
         slope, shift = np.polyfit(energy, drawn, 1)
         assert slope < 0 and drawn == pytest.approx(slope * np.array(energy) + shift, abs=1e-6)
