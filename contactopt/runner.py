@@ -63,8 +63,7 @@ class Result(Outcome):
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
         """Write the result as one page to explore in a browser, by default into a temporary file,
-        and open it. InputError if plotly is not installed, which the page takes its drawing program
-        from, or if the file, whose name ends in .html, cannot be written.
+        and open it. InputError if the file, whose name ends in .html, cannot be written.
 
         The page needs no network and nothing but the browser (contactopt.figures.view_page says
         what is on it).
@@ -234,10 +233,6 @@ def _check_output(out: str | Path | None, options: RunOptions) -> None:
         raise InputError(
             f"figures must be formats of {', '.join(FORMATS)}, or () for none; got {figures!r}."
         )
-    if options.html:
-        from contactopt.figures.view_page import check_installed
-
-        check_installed()
     if out is not None:
         check_folder(Path(out))
 
