@@ -82,7 +82,7 @@ def check_scene(
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
     coupled = [text for own in made.couplings for text in own.remarks]
-    told = dict.fromkeys([*told, *said_of_meshes(scene), *heard])
+    told = list(dict.fromkeys([*told, *said_of_meshes(scene), *heard]))
     notes = [*told, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
