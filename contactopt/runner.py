@@ -31,7 +31,7 @@ from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
-from contactopt.readings.validity import check_possible, validity
+from contactopt.readings.validity import impossible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
@@ -290,6 +290,9 @@ def _result(
             summary["remarks"] += corner_remarks(reduction, solution)
     noted = [solution] if solved.path is None else solved.path.solutions
     every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
+    if solution.solved:  # the states of a path before are kept
+        refuse = solved.path is None
+        every = impossible(summary["limits"], reduction.couplings, refuse) + every
     summary["remarks"] = list(dict.fromkeys(every))
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
@@ -314,8 +317,6 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    if solution.solved and solved.path is None:  # the states of a path before are kept
-        check_possible(limits, reduction.couplings)
     known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {

@@ -60,7 +60,10 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         facets = np.asarray(mesh.boundaries[name])
         every = tied or bool(thin_facets(basis.mesh, facets).any())
         copied = copies(basis, scene.degree, facets, mesh, part.curve_of(name))
-        traces[name] = contact_trace(basis, scene.degree, facets, weight, every, copied)
+        try:
+            traces[name] = contact_trace(basis, scene.degree, facets, weight, every, copied)
+        except InputError as error:
+            raise InputError(f"body '{part.name}', boundary '{name}': {error}") from None
     return Assembly(
         part.name,
         kind,
