@@ -213,7 +213,10 @@ def _solved(
             options.method in (None, "auto", Auto()) and "max_iterations" not in options.settings
         )
         if found is None and usual and problem.motions:
-            few = {"progress": lines, "max_iterations": FIRST_TRY} | options.of_solve
+            few: dict[str, Any] = {
+                "progress": lines,
+                "max_iterations": FIRST_TRY,
+            } | options.of_solve
             tried = solve(problem, start=start, **few)
             ended = tried.status is not Status.ITERATION_LIMIT
             found = tried if ended or sliding(problem, tried, start) else None
