@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from contactopt.errors import BackendError, InputError
     from contactopt.material import Material
     from contactopt.meshes.mesh_files import load_mesh
+    from contactopt.methods.batch import solve_batch
     from contactopt.methods.diagnosis import Diagnosis, diagnose
     from contactopt.methods.driver import solve
     from contactopt.methods.enumeration import all_solutions
@@ -63,6 +64,7 @@ _HOMES = {
     "errors": "BackendError InputError",
     "material": "Material",
     "meshes.mesh_files": "load_mesh",
+    "methods.batch": "solve_batch",
     "methods.diagnosis": "Diagnosis diagnose",
     "methods.driver": "solve",
     "methods.enumeration": "all_solutions",
