@@ -25,7 +25,7 @@ from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.unbalanced_loads import escape, sentence
-from contactopt.readings.plausibility import doubts
+from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.scenes.scene import Plate, Scene
 from contactopt.solving.solve_scene import STEPS
 
@@ -82,7 +82,8 @@ def check_scene(
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
     coupled = [text for own in made.couplings for text in own.remarks]
-    notes = [*told, *heard, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
+    told = list(dict.fromkeys([*told, *said_of_meshes(scene), *heard]))
+    notes = [*told, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
