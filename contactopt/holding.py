@@ -52,6 +52,7 @@ from contactopt.solving.follow import follow_path
 from contactopt.solving.solve_scene import Options
 
 GROWTH = 4.0  # of the prescribed motion from push to push
+EARLY = 6  # pushes that need not be solved while the motion is small
 PUSHES = 20  # so that the last one is 1e12 times the first
 STEADY = 1e-5  # relative growth of the force below which it no longer grows
 ALIKE = 1e-3  # relative difference by which forces are a multiple of others, or two limits the same
@@ -71,7 +72,7 @@ class Limit:
 
     factor    0: at any such load; infinite: at none; not a number: no push could be solved
     interval  of the factors at which forces in the friction cones balance the loads, with `factor`
-              in place of its upper end; None: the bodies rest at no factor
+              for its upper end; None: the bodies rest at no factor
     error     of the factor, estimated from two meshes
     way       'statics', 'bound', 'push' or 'supports', which the sentence explains
     sentence  the answer in words
@@ -115,7 +116,13 @@ def limit(
     ------
     InputError : for a load that is not there, which names those that are
     """
-    states, _ = states_of(scene, **changes)
+    return limit_of(states_of(scene, **changes)[0], load, note)
+
+
+def limit_of(
+    states: tuple[Scene, ...], load: str | None = None, note: Note = lambda text: None
+) -> Limit:
+    """As limit(), of the states of a load path."""
     held = _held(states, load)
     found = []
     for mesh, (before, last) in enumerate(_meshes(held, states[-1]), 1):
@@ -190,7 +197,7 @@ def _without(scene: Scene, load: str) -> Scene:
 def _force(held: Scene, last: Scene) -> float | None:
     """The force that the factor 1 stands for, where one total force is all of the load."""
     before = _rows(held)
-    found = [(v - before[name][0], total) for name, (v, total) in _rows(last).items()]
+    found = [(v - before.get(name, (0.0,))[0], total) for name, (v, total) in _rows(last).items()]
     changed = [(value, total) for value, total in found if value]
     return changed[0][0] if len(changed) == 1 and changed[0][1] else None
 
@@ -233,10 +240,7 @@ def _on_mesh(held: tuple[Scene, ...], last: Scene, note: Note) -> Found:
     if np.isnan(high):
         return 0.0, None, "statics"
     note(f"statics: {low:.6g} to {high:.6g}")
-    if low > 0:
-        backward = push.force(-1.0, slipped, note)
-        low = backward if np.isfinite(backward) else low
-    found = push.force(1.0, slipped, note)
+    found = push.force(slipped, note)
     if np.isnan(found) and np.isfinite(high):
         return high, (low, high), "bound"
     if found == high or abs(found - high) <= ALIKE * min(abs(high), abs(found)) + push.nothing:
@@ -286,10 +290,8 @@ class _Push:
         found = float(made.variables["f"].value)
         return 0.0 if abs(found) <= 1e2 * self.nothing else found
 
-    def force(self, way: float, slipped: np.ndarray | float, note: Note) -> float:
-        """The largest f along the load (way = 1), or minus the one against it (-1): infinite if it
-        grows for ever, and not a number if a push is not solved.
-        """
+    def force(self, slipped: np.ndarray | float, note: Note) -> float:
+        """The largest f: infinite if it grows for ever, not a number if a push is not solved."""
         old, size = self.problem, float(np.linalg.norm(self.load))
         turn = la.qr(self.load[:, None])[0]
         turn[:, 0] = self.load / size
@@ -299,7 +301,7 @@ class _Push:
         q = old.q + (v * self.c * rest - g * rest).reshape(old.q.shape)
         pushed = old.altered(V=V[:, 1:], s=s[1:], Q=Q, q=q, motions=())
         loaded = old.altered(s=np.abs(old.s) + np.abs(self.load))
-        first = way * size * max(scales_of(own).length for own in (old, loaded))
+        first = size * max(scales_of(own).length for own in (old, loaded))
         d, f, r, start, steepest = 0.0, np.nan, np.zeros(q.shape), None, 0.0
         for push in range(PUSHES):
             q_d = q + d * v.reshape(q.shape)
@@ -308,19 +310,22 @@ class _Push:
             now = solve(pushed.altered(q=step), start=start)
             if not now.solved:
                 note(f"push {push + 1}: {now.message}")
+                if start is None and push < EARLY:  # where nothing rests without the load
+                    d = GROWTH * d or first
+                    continue
                 return np.nan
             before, f, last, r = f, -float(v @ now.reactions.ravel()) - rest, r, now.reactions
             note(f"push {push + 1}: {f:.6g} times the load")
-            slope = abs(f - before) / (abs(d) * (1 - 1 / GROWTH * (push > 1)) or np.inf)
+            slope = abs(f - before) / ((1 - 1 / GROWTH * (push > 1)) * d or np.inf)
             steepest = np.fmax(steepest, slope)
             small = STEADY * abs(f) + self.nothing
             if abs(f - before) <= small and (slope <= ALIKE * steepest or abs(f) <= small):
-                return max(f, before, key=lambda own: way * own)
+                return max(f, before)
             if push > 1 and np.linalg.norm(r - GROWTH * last) <= ALIKE * np.linalg.norm(r):
                 break
             u = pushed.altered(q=q_d).displacements(r, now.multipliers)
             slipped, start, d = u[:, 1:], now, GROWTH * d or first
-        return way * np.inf
+        return np.inf
 
 
 def _words(scene: Scene, load: str, force: float | None, found: list[Found], error: float) -> str:
