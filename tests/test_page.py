@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from scipy.spatial import KDTree
 
 from contactopt import InputError, cli, run, scenes
 from contactopt.coupling.back_to_bodies import recover
@@ -87,6 +88,28 @@ def test_half_models_are_shown_whole(folder):
     low, high = np.array(data["box"])
     assert np.allclose(low[:2], -high[:2])
     assert data_of(folder / "flat" / "view.html")["mirrors"] == [[0, 0.0]]
+
+
+def test_what_touches_is_drawn_touching(tmp_path):
+    """A press fit overlaps before it is loaded: with displacements magnified, the drawn surfaces
+    are apart by as many times the gap that there is, which is none where they touch."""
+    result = run("press-fit", tmp_path, figures=(), html=True)
+    data, s = data_of(tmp_path / "view.html"), 100.0
+    (pair,) = result.scene.pairs
+    assert np.abs(result.reduction.gap).max() > 1e-3 and data["scale"] > 1
+    drawn = {}
+    for body in data["bodies"]:
+        x, u, d = (decoded(body[key]) for key in ("points", "move", "lift"))
+        drawn[body["name"]] = x[:, :2], x[:, :2] + s * u[-1] + (s - 1) * d[0]
+    apart = []
+    for name in pair.bodies:
+        x, moved = drawn[name]
+        near = KDTree(x).query(result.problem.coordinates.T)[1]
+        apart.append(moved[near])
+    normals = result.reduction.frames[:, 0]
+    gap = np.einsum("ki,ki->k", normals, apart[0] - apart[1])
+    true = result.problem.displacements(result.solution.reactions, result.solution.multipliers)
+    assert np.abs(gap - s * true[:, 0]).max() < 0.02 * s * np.abs(result.reduction.gap).max()
 
 
 def test_every_state_of_a_path_is_on_the_page(folder):

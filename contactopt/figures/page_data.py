@@ -65,7 +65,8 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
     reach = min(float(np.ptp(box, axis=0).max()), 4 * max(np.ptp(b, axis=0).max() for b in boxes))
     stresses = [values["von_mises"].ravel() for values in fields.values()]
     inside = len(axes) == 3 and sum(len(mesh.points) for mesh in bodies.values()) <= MOST_INSIDE
-    contacts, first = [], 0
+    contacts: list[dict[str, Any]] = []
+    first = 0
     for name, mesh in pairs.items():
         own = slice(first, first + len(mesh.points))
         motion = _motion(bodies, fields, mesh.points, len(axes))

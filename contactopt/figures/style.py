@@ -36,7 +36,7 @@ def magnification(size: float, displacement: float, gaps: Sequence[np.ndarray] =
     varies = max((float(np.ptp(gap)) for gap in gaps if len(gap)), default=0.0)
     if displacement == 0 or varies > APART * displacement:
         return 1.0
-    largest = max(float(np.abs(length).max(initial=0.0)) for length in (displacement, *gaps))
+    largest = max([displacement, *(float(np.abs(gap).max(initial=0.0)) for gap in gaps)])
     target = SHARE * size / largest
     if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
         return 1.0
