@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from contactopt.derivatives.gradient import gradient
     from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
+    from contactopt.holding import Limit, limit
     from contactopt.material import Material
     from contactopt.meshes.mesh_files import load_mesh
     from contactopt.methods.batch import solve_batch
@@ -62,6 +63,7 @@ _HOMES = {
     "derivatives.gradient": "gradient",
     "derivatives.interface": "sensitivity",
     "errors": "BackendError InputError",
+    "holding": "Limit limit",
     "material": "Material",
     "meshes.mesh_files": "load_mesh",
     "methods.batch": "solve_batch",
