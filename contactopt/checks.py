@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import logging
 import os
+import weakref
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from difflib import get_close_matches
@@ -203,3 +204,20 @@ def overheard() -> Iterator[list[str]]:
         yield told
     finally:
         logger.removeHandler(handler)
+
+
+_TOLD: dict[int, tuple[str, ...]] = {}  # by the array of its nodes: copies of a mesh share it
+
+
+def remember(mesh: Any, told: Iterable[str]) -> Any:
+    """The mesh, whose remarks, made when it was read, are those of every run with it."""
+    if told := tuple(told):
+        if id(mesh.doflocs) not in _TOLD:
+            weakref.finalize(mesh.doflocs, _TOLD.pop, id(mesh.doflocs), None)
+        _TOLD[id(mesh.doflocs)] = told
+    return mesh
+
+
+def remembered(mesh: Any) -> tuple[str, ...]:
+    """What was said of a mesh when it was read."""
+    return _TOLD.get(id(getattr(mesh, "doflocs", None)), ())

@@ -27,11 +27,11 @@ from contactopt.readings.chords import chord_remarks
 from contactopt.readings.corners import corner_remarks
 from contactopt.readings.peaks import pressure_reading
 from contactopt.readings.plate_motions import approach
-from contactopt.readings.plausibility import doubts
+from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
-from contactopt.readings.validity import check_possible, validity
+from contactopt.readings.validity import impossible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
@@ -63,8 +63,7 @@ class Result(Outcome):
 
     def view(self, file: str | Path | None = None, show: bool = True) -> Path:
         """Write the result as one page to explore in a browser, by default into a temporary file,
-        and open it. InputError if plotly is not installed, which the page takes its drawing program
-        from, or if the file, whose name ends in .html, cannot be written.
+        and open it. InputError if the file, whose name ends in .html, cannot be written.
 
         The page needs no network and nothing but the browser (contactopt.figures.view_page says
         what is on it).
@@ -133,6 +132,7 @@ def _run(
     options, changes = choose(changes, {} if file is None else file.solve)
     _check_output(out, options)
     states = _states(scene, file, changes)
+    of_meshes = said_of_meshes(states[-1])
     name = options.method or default_method(options.settings)
     method = find_method(name, **options.settings)
     method.backends(states[-1].dim)  # refused before any work if one of them cannot be used
@@ -149,7 +149,7 @@ def _run(
         if solved is None or options.accuracy is not None:
             solved, estimate = _solved(states, options, limits, how)
         names = (name, *method.backends(states[-1].dim))
-        result = _result(solved, estimate, names, told())
+        result = _result(solved, estimate, names, (*of_meshes, *told()))
         if options.read:
             from contactopt.accuracy.indicators import read_once  # with the room of derivatives
 
@@ -233,10 +233,6 @@ def _check_output(out: str | Path | None, options: RunOptions) -> None:
         raise InputError(
             f"figures must be formats of {', '.join(FORMATS)}, or () for none; got {figures!r}."
         )
-    if options.html:
-        from contactopt.figures.view_page import check_installed
-
-        check_installed()
     if out is not None:
         check_folder(Path(out))
 
@@ -294,6 +290,9 @@ def _result(
             summary["remarks"] += corner_remarks(reduction, solution)
     noted = [solution] if solved.path is None else solved.path.solutions
     every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
+    if solution.solved:  # the states of a path before are kept
+        refuse = solved.path is None
+        every = impossible(summary["limits"], reduction.couplings, refuse) + every
     summary["remarks"] = list(dict.fromkeys(every))
     if solved.path is not None:
         single = len(reduction.problem.pairs) == 1
@@ -318,8 +317,6 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    if solution.solved and solved.path is None:  # the states of a path before are kept
-        check_possible(limits, reduction.couplings)
     known = doubts(scene, reduction.couplings)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {

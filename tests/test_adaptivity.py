@@ -47,17 +47,6 @@ def measure(mesh, name=None):
     return float(basis.dx.sum())
 
 
-def test_hexahedra_that_cannot_be_cut_alike_are_refused():
-    """Tetrahedra that meet at crossed diagonals do not hang together when they are divided."""
-    mesh = MESHES["hexahedra"]
-    t = mesh.t.copy()
-    t[:, 0] = t[[1, 4, 5, 0, 7, 2, 3, 6], 0]  # the first cell turned by a quarter
-    mesh = skfem.MeshHex(mesh.p, t).with_boundaries(NAMES)
-    part = Part("block", mesh, MATERIAL, (), contact="bottom")
-    with pytest.raises(InputError, match="different orders"):
-        divisible(Scene("block", part, Rigid("ground"), 0.0), True)
-
-
 @pytest.mark.parametrize("kind", list(MESHES))
 def test_divided_meshes_are_whole_and_keep_their_boundaries(kind):
     random = np.random.default_rng(0)

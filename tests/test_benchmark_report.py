@@ -253,11 +253,6 @@ def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     [
         ('kind = "speed_accuracy"', 'kind = "pie"', "figure 2: unknown kind 'pie'"),
         ('caption = "What accuracy costs."', "", "figure 2: it needs a caption"),
-        (
-            'where = {family = "rigid_bodies"}',
-            'where = {family = "none"}',
-            "figure 2 (speed_accuracy): no row",
-        ),
         ('where = {family = "rigid_bodies"}', "colour = 1", "figure 2 (speed_accuracy)"),
         ('findings = "mine.py"', 'findings = "yours.py"', "yours.py"),
     ],
@@ -297,6 +292,35 @@ def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch)
 
     assert kept(tmp_path / name / "report.md") == kept(folder / "report.md")
     assert all(file.stat().st_size < 1_000_000 for file in folder.iterdir())
+
+
+def test_a_figure_without_rows_is_left_out_with_a_sentence(reported, monkeypatch):
+    monkeypatch.chdir(reported)
+    Path("filtered").mkdir()
+    shutil.copy("campaigns/mine.py", "filtered")
+    other = EXPERIMENT.replace('family = "rigid_bodies"}', 'family = "none"}')
+    layout = read_layout(written(Path("filtered"), other, "small.toml"))
+    text = benchmark.reports.write_report(layout, Path("filtered"), benchmark.load("reports/small"))
+    assert "Number 2 (speed_accuracy) is left out: no row with {'family': 'none'}." in text
+    assert text.count("*Figure ") == 1 and text.count("*Table ") == 1
+
+
+FOUND = [path for path in sorted(CAMPAIGNS.glob("*.toml")) if read_layout(path).findings]
+
+
+@pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
+def test_findings_say_what_the_table_lacks(path):
+    """Where runs are filtered out, as by `bench --filter`, or no method of a kind is there."""
+    layout = read_layout(path)
+    table, lacking = benchmark.load(REPORTS / layout.name), 0
+    for column in {"setting", "name", "family", "success"} & {*table}:
+        for value in table[column].unique()[:2]:
+            rows = table[table[column] == value]
+            own = [name for name in rows if "." in name and rows[name].isna().all()]
+            found = benchmark.reports._findings(layout, rows.drop(columns=own))
+            assert found and not re.search(r"\bnan\b", " ".join(found))
+            lacking += sum(text.startswith("The table lacks the runs for") for text in found)
+    assert lacking
 
 
 def test_of_sixteen_methods_eight_have_colours_marks_and_names_that_never_meet():

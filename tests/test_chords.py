@@ -102,6 +102,15 @@ def test_meshes_that_match_or_are_fine_enough_say_nothing(degree):
         assert said == (off > SHOWN)
 
 
+@pytest.mark.parametrize("chords, large", [(8, True), (16, False)])
+def test_edges_of_second_degree_that_match_turn_the_stress(chords, large):
+    """Lame's pressure beside that between straight edges at angles, which no gap changes."""
+    exact = 0.003 / (lame(1, 2, 50.0, 1, 0, 1) - lame(0.5, 1, 100.0, 0, 1, 1))
+    found = run(press_fit((chords, chords), 2, overlap=0.003), figures=())
+    assert (np.abs(found.pressure / exact - 1).max() > SHOWN) == large
+    assert any("turns the stress" in remark for remark in found.summary["remarks"]) == large
+
+
 def test_remarks_are_those_of_the_turned_mesh():
     known = None
     for turn in (0.0, 0.4):

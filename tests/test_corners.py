@@ -12,6 +12,7 @@ from turned import mirror, moved, turn
 from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce, run, solve
 from contactopt.bodies.corners import copies
 from contactopt.bodies.elements import make_basis
+from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve
 
 E, NU = 1e4, 0.3
@@ -313,3 +314,34 @@ def test_the_peak_of_the_pressure_is_read_on_its_own_side():
     found = run(scene, figures=(), accuracy=0.01, quantity="pressure")
     assert found.estimate.reached and found.estimate.value == pytest.approx(1.0, abs=1e-8)
     assert not any("largest pressure" in text for text in found.summary["remarks"])
+
+
+def lips():
+    """A square with a slit from its left side to its middle."""
+    grid = np.linspace(0, 2, 5)
+    parts = skfem.MeshQuad.init_tensor(grid, grid[:3]), skfem.MeshQuad.init_tensor(grid, grid[2:])
+    p, t = np.hstack([own.p for own in parts]), np.hstack([parts[0].t, parts[1].t + 15])
+    same = np.argmax(np.all(p[:, :, None] == p[:, None], axis=0), axis=1)
+    shared = np.where(p[0] >= 1, same, np.arange(p.shape[1]))
+    used, number = np.unique(shared[t], return_inverse=True)
+    return skfem.MeshQuad(p[:, used], number.reshape(t.shape)), lambda x: (x[1] == 1) & (x[0] < 1)
+
+
+def holes():
+    """A square with two square holes that meet in a corner."""
+    mesh = skfem.MeshQuad.init_tensor(*[np.arange(5.0)] * 2)
+    x, y = mesh.p[:, mesh.t].mean(axis=1) - 2
+    mesh = mesh.restrict(np.flatnonzero((np.maximum(abs(x), abs(y)) > 1) | (x * y < 0)))
+    return mesh, lambda x: np.abs(x - 2).max(axis=0) < 1.2
+
+
+@pytest.mark.parametrize("make, normal, place", [(lips, (1, 0), "0, 1"), (holes, (0, 1), "2, 2")])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_place_without_a_normal_is_refused(make, normal, place, degree):
+    """Facets that face opposite ways share a contact."""
+    mesh, side = make()
+    mesh = mesh.with_boundaries({"inside": side, "foot": lambda x: x[1] == 0})
+    body = Part("block", mesh, Material(1.0, 0.3), (Support("foot"),), contact="inside")
+    scene = Scene("s", body, Rigid("wall", normal, lambda x: 0 * x[0]), 0.0, degree=degree)
+    with pytest.raises(InputError, match=rf"'block'.* face opposite ways at \({place}\)"):
+        reduce(scene)

@@ -536,4 +536,45 @@ def test_shells_that_are_no_side_of_a_body_are_told(tmp_path, caplog):
     fin = "*NODE\n500, 5, 0, 0\n501, 5, 1, 0\n*ELEMENT, TYPE=S4\n91, 1, 2, 501, 500\n"
     (tmp_path / "deck.inp").write_text(BRICK + "\n" + FACE + fin)
     load_mesh(tmp_path / "deck.inp")
-    assert "1 shells of the file are no sides" in caplog.text
+    assert "deck.inp: 1 shell off the sides and edges" in caplog.text
+
+
+BAR = "*ELEMENT, TYPE={}, ELSET=BAR\n900,1,2\n901,1,{}\n"
+CARDS = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n"
+CARDS += "CTETRA,1,7,1,2,3,4\nCBAR,2,8,1,2\n"
+
+
+@pytest.mark.parametrize(
+    "name, text, told",
+    [
+        ("a.inp", BRICK + "\n" + BAR.format("T3D2", 7), "a.inp: 1 line off the sides"),
+        ("a.inp", ONE + BAR.format("B21", 3), "a.inp: 1 line off the sides"),
+        ("a.inp", BRICK + "\n" + BAR.format("B31", 4), ""),
+        (
+            "a.inp",
+            BRICK + "\n" + BAR.format("B31", 4) + "*BEAM SECTION, ELSET=BAR, SECTION=RECT\n1,1",
+            "a.inp, line 15: the stiffness of 2 elements B31",
+        ),
+        (
+            "a.inp",
+            f"*PART, NAME=P\n{BRICK}\n{FACE}*SHELL SECTION, ELSET=SKIN\n*END PART\n*ASSEMBLY\n"
+            "*INSTANCE, NAME=I, PART=P\n0,0,2\n*END INSTANCE\n*END ASSEMBLY\n",
+            "a.inp, line 15: the stiffness of 1 elements S4",
+        ),
+        ("a.bdf", CARDS + "PSOLID,7,1\nENDDATA", ""),
+        ("a.bdf", CARDS + "PBAR,8,1,1.,1.,1.,1.\nENDDATA", "a.bdf, line 6: the stiffness of 1"),
+    ],
+)
+def test_what_stiffens_no_body_is_told_in_every_run_with_the_mesh(tmp_path, name, text, told):
+    """Bars and shells that are no elements of a body, or have a section, in a remark of a run of a
+    scene that is made in Python from a mesh that was read before.
+    """
+    (tmp_path / name).write_text(text)
+    mesh = load_mesh(tmp_path / name)
+    sides = {"foot": lambda x: x[-1] == mesh.p[-1].min(), "wall": lambda x: x[0] == mesh.p[0].min()}
+    part = Part(
+        "block", mesh.with_boundaries(sides), Material(1, 0), (Support("wall"),), (), "foot"
+    )
+    kind = {2: "plane-strain", 3: "solid"}[len(mesh.p)]
+    remarks = run(Scene("one", part, Rigid("floor"), 0.0, kind=kind)).summary["remarks"]
+    assert [text.startswith(f"{tmp_path}/{told}") for text in remarks] == [True] * bool(told)

@@ -3,6 +3,7 @@ ripple in Hertz.
 """
 
 from dataclasses import replace
+from itertools import permutations, product
 
 import meshio
 import numpy as np
@@ -31,7 +32,7 @@ from contactopt.bodies.body import build_body
 from contactopt.bodies.elements import Faces, contact_trace, make_basis, weight_at
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.material import lame
-from contactopt.meshes.cells import CURVED
+from contactopt.meshes.cells import CURVED, volumes
 from contactopt.meshes.cells import SHAPES as CELLS
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
 from contactopt.scenes.common import with_elements
@@ -184,15 +185,22 @@ def test_cutting_into_simplices_keeps_volume_and_boundaries(kind):
         assert areas[0] == pytest.approx(areas[1])
 
 
-def test_cells_that_cannot_be_cut_alike_are_refused():
-    mesh = skfem.MeshHex.init_tensor(
-        np.linspace(0, 1, 3), np.linspace(0, 1, 2), np.linspace(0, 1, 2)
-    )
-    t = mesh.t.copy()
-    t[:, 0] = t[[1, 4, 5, 0, 7, 2, 3, 6], 0]  # the first cell turned by a quarter
-    assert skfem.MeshHex(mesh.p, t).is_valid()
-    with pytest.raises(InputError, match="different orders"):
-        simplices(skfem.MeshHex(mesh.p, t))
+def test_cells_with_corners_in_any_order_are_cut_into_tetrahedra_that_fit():
+    """Turns and mirror images number the corners of a cube in 48 ways; matching bodies match."""
+    corners, ways = skfem.MeshHex().p, []
+    for order, signs in product(permutations(range(3)), product([1, -1], repeat=3)):
+        turned = (np.array(signs)[:, None] * (corners[list(order)] - 0.5) + 0.5).T
+        ways.append([np.abs(corners.T - point).sum(axis=1).argmin() for point in turned])
+    rng, grid, faces = np.random.default_rng(5), np.linspace(0, 1, 5), []
+    for height in (grid - 1, grid):
+        mesh = tensor_mesh(grid, grid, height)
+        t = np.stack([cell[ways[rng.integers(48)]] for cell in mesh.t.T], axis=1)
+        cut = simplices(skfem.MeshHex(mesh.p, t))
+        assert len(cut.boundary_facets()) == 2 * len(mesh.boundary_facets())
+        np.testing.assert_allclose(np.abs(volumes(cut)[0]), 1 / 64)  # six times
+        flat = cut.facets[:, np.all(cut.p[2, cut.facets] == 0, axis=0)]
+        faces.append({frozenset(map(tuple, cut.p[:, facet].T)) for facet in flat.T})
+    assert faces[0] == faces[1] and len(faces[0]) == 32
 
 
 @pytest.mark.parametrize("degree", [0, 3, 1.5, "2"])

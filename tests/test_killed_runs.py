@@ -16,9 +16,12 @@ import pytest
 
 import contactopt
 from contactopt import Plate, Scene, runner
+from contactopt.cli import main
 from contactopt.files.writing import replace_file
 from contactopt.scenes import PATHS, SCENES, make_path, make_scene
+from contactopt.scenes.scene_files import read_scene_file
 from contactopt.solving.restart import FILE, Restart, read_known
+from tests.test_how_tos import BLOCK, SITE
 
 SMALL = {
     "a scene": ("punch-3d", {"elements": 4}),
@@ -128,8 +131,10 @@ def as_path(name: str) -> tuple[Scene, ...]:
     if name in PATHS:
         steps = {"hertz-dissimilar": 2, "rough": 2}.get(name, 1)
         return make_path(name, steps=steps, **size)[:3]
-    scene = make_scene(name, **size)
+    return with_half_of_it(make_scene(name, **size))
 
+
+def with_half_of_it(scene: Scene) -> tuple[Scene, ...]:
     def half(part: Any) -> Any:
         if part.meshed:
             return replace(part, loads=tuple(map(lighter, part.loads)))
@@ -144,12 +149,38 @@ def as_path(name: str) -> tuple[Scene, ...]:
     return scene.with_parts(half), scene
 
 
+def of_a_how_to(page: str, folder: Path) -> tuple[Scene, ...]:
+    """The scene file of a page as a load path; its meshes are made as the page makes them."""
+    text = (SITE / f"{page}.md").read_text()
+    if "import gmsh" in text:
+        pytest.importorskip("gmsh", exc_type=ImportError)
+    file, names = folder / "scene.toml", {}
+    for kind, block in BLOCK.findall(text):
+        if kind == "python":
+            exec(compile(block, page, "exec"), names)
+        if kind == "toml" and "[bodies." in block:
+            file.write_text(block)
+            break
+        for line in block.replace("\\\n", "").splitlines() if kind == "sh" else ():
+            assert line.split()[1] != "mesh" or main(line.split()[1:]) == 0
+    states = read_scene_file(file, HELD.get(page, {})).states
+    return states if len(states) > 1 else with_half_of_it(states[0])
+
+
+# the points of a rough surface are given
+NAMED = [(name, adaptive) for name in sorted({*SCENES} - {"rough"}) for adaptive in (False, True)]
+PAGES = ("check_before_solving", "scene_files", "take_home", "parts_from_cad", "your_own_mesh")
+HELD = {"check_before_solving": {"bodies.block.tractions.1.x": 20}}  # as the page mends it
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("adaptive", [False, True])
-@pytest.mark.parametrize("name", sorted(SCENES))
-def test_every_named_scene_as_a_path_with_an_accuracy(name, adaptive, tmp_path, monkeypatch):
-    """Saved at each step, and resumed from the first, some middle and the last one."""
-    states = as_path(name)
+@pytest.mark.parametrize("name, adaptive", [*NAMED, *((page, True) for page in PAGES)])
+def test_a_path_with_an_accuracy(name, adaptive, tmp_path, monkeypatch):
+    """Every named scene and the parts of the how-tos, saved at each step, and resumed from the
+    first, some middle and the last one.
+    """
+    monkeypatch.chdir(tmp_path)
+    states = of_a_how_to(name, tmp_path) if name in PAGES else as_path(name)
     if adaptive and any(part.elastic and not part.meshed for part in states[0].parts):
         pytest.skip("a half-space has no elements to divide")
     monkeypatch.setattr(runner, "_states", lambda *_: states)
@@ -157,10 +188,10 @@ def test_every_named_scene_as_a_path_with_an_accuracy(name, adaptive, tmp_path, 
     options["max_unknowns"] = 3000
     with monkeypatch.context() as patched:
         copies = kept_at_each_step(tmp_path, patched)
-        whole = contactopt.run(name, tmp_path / "whole", **options)
+        whole = contactopt.run("punch-2d", tmp_path / "whole", **options)
     for number in {0, len(copies) // 2, len(copies) - 1}:
         out = tmp_path / f"resumed-{number}"
         out.mkdir()
         shutil.copy(copies[number], out / FILE)
-        again = contactopt.run(name, out, resume=True, **options)
+        again = contactopt.run("punch-2d", out, resume=True, **options)
         np.testing.assert_allclose(numbers(again), numbers(whole), rtol=1e-3, atol=1e-9)

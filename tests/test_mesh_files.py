@@ -886,3 +886,34 @@ def test_partitioned_files_of_gmsh_are_refused(gmsh, tmp_path):
     gmsh.write(str(tmp_path / "a.msh"))
     with pytest.raises(InputError, match="partition"):
         load_mesh(tmp_path / "a.msh")
+
+
+SU2 = (
+    "% a square of two kinds of triangles\nNDIME= 2\nNELEM= 2\n5 0 1 2 0\n5 0 2 3 1\nNPOIN= 4\n"
+    "0. 0. 0\n1. 0. 1\n1. 1. 2\n0. 1. 3\nNMARK= 3\nMARKER_TAG= 1\nMARKER_ELEMS= 1\n3 0 1\n"
+    "MARKER_TAG= wall\nMARKER_ELEMS= 2\n3 1 2\n3 2 3\nMARKER_TAG= 2\nMARKER_ELEMS= 1\n3 3 0\n"
+)
+
+
+@pytest.mark.parametrize(
+    "name, text, words",
+    [
+        ("a.su2", SU2.replace("5 0 1 2 0", "22 0 1 2 4 5 6 0"), r"line 4: elements of type 22"),
+        ("a.su2", SU2 + "NDIME= 2\n", r"line 22: it has several zones"),
+        ("a.su2", SU2[:-6], "ends before the 1 rows of MARKER_ELEMS"),
+        (
+            "a.mesh",
+            "MeshVersionFormatted 2\nDimension 3\nTetrahedraP2\n",
+            r"order \(TetrahedraP2\)",
+        ),
+        ("a.unv", "    -1\n  2411\n", "its ending names no format"),
+    ],
+)
+def test_markers_of_su2_keep_their_names_and_second_orders_are_refused(tmp_path, name, text, words):
+    """A number and a name that meshio counts to the same number are two boundaries."""
+    (tmp_path / "whole.su2").write_text(SU2)
+    sides = load_mesh(tmp_path / "whole.su2").boundaries
+    assert {side: len(facets) for side, facets in sides.items()} == {"1": 1, "wall": 2, "2": 1}
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_mesh(tmp_path / name)

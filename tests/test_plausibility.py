@@ -111,10 +111,15 @@ def test_named_scenes_get_no_sentence(name):
 
 def test_an_impossible_strain_is_refused_and_not_noted():
     """A block that is held overlaps the floor by nearly its height, or a load is meant for another
-    unit. A strain of a tenth is noted.
+    unit. A strain of a tenth is noted, and one of order one by the first of all remarks.
     """
     block_ = block((0, 10), (0, 10))
-    for overlap, load, refused in ((9.5, 0, True), (1.0, 0, False), (0, -2e6, True)):
+    for overlap, load, refused in (
+        (9.5, 0, True),
+        (1.0, 0, False),
+        (0, -4e5, False),
+        (0, -2e6, True),
+    ):
         held = (Support("up"),) if overlap else ()
         loads = (Traction("up", (0.0, load)),) if load else ()
         part = Part("b", block_, STEEL, held, loads, contact="low")
@@ -126,6 +131,7 @@ def test_an_impossible_strain_is_refused_and_not_noted():
         else:
             remarks = run(scene, figures=()).summary["remarks"]
             assert any("a strain of up to" in remark for remark in remarks)
+            assert remarks[0].startswith("no body can deform like this") == (overlap == 0)
 
 
 def test_pieces_that_meet_in_a_node_are_refused():

@@ -25,7 +25,7 @@ HOW_TOS = {*PAGES, "your_own_mesh"}
 LIMIT = 900.0  # s: three minutes on two idle cores, more where other tests run
 
 
-def BUILDS(test):  # noqa: N802
+def BUILDS(test):
     """A slow test of the built site: one worker builds it for all of them."""
     return pytest.mark.slow(pytest.mark.xdist_group("site")(test))
 

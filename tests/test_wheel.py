@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -71,6 +72,9 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
         summary["status"] == "solved"
         and (tmp_path / "out" / "deformed.png").stat().st_size > 10_000
     )
+    page = "import contactopt as c; c.run('punch-2d', elements=4).view('page.html', show=False)"
+    run(binaries / "python", "-c", page, cwd=tmp_path)
+    assert (tmp_path / "page.html").stat().st_size > 50_000, "pages need no extra"
     code = "import contactopt; print(contactopt.__version__, contactopt.__file__)"
     version, place = run(binaries / "python", "-c", code, cwd=tmp_path).split()
     assert version in wheel.name and str(tmp_path) in place
@@ -80,7 +84,7 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     )
     told = run(sys.executable, "-m", "mypy", "--python-executable", binaries / "python", user,
                cwd=tmp_path)  # fmt: skip
-    assert '"builtins.float"' in told, "users' type checkers see the types"
+    assert re.search(r'"(builtins\.)?float"', told), "users' type checkers see the types"
 
 
 # what each extra is for, tried in an environment that has this extra alone
@@ -112,11 +116,6 @@ from contactopt import scenes
 from contactopt.jax import quantity
 value = quantity(scenes.flat_punch(2, elements=4), "approach", ("mu",))
 assert abs(jax.grad(value)(jax.numpy.array([0.1]))[0]) > 0
-""",
-    "view": """
-import contactopt
-page = contactopt.run("punch-2d", elements=4).view("page.html", show=False)
-assert page.stat().st_size > 100_000
 """,
     "benchmark": """
 from pathlib import Path

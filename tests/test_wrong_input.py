@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from contactopt import InputError, InterfaceProblem, fclib, follow, reduce, run, solve
+from contactopt import InputError, InterfaceProblem, Material, fclib, follow, reduce, run, solve
 from contactopt.cli import main
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.scenes import cattaneo, flat_punch
@@ -216,6 +216,14 @@ def test_meshes_that_cannot_be(elements):
     for name in ("punch-2d", "punch-3d", "sphere"):
         with pytest.raises(InputError):
             run(name, elements=elements)
+
+
+def test_a_body_that_is_held_everywhere_is_refused():
+    sides = {"foot": lambda x: x[1] == 0, "rest": lambda x: x[1] > 0}
+    mesh = tensor_mesh(np.array([0.0, 1.0]), np.array([0.0, 1.0])).with_boundaries(sides)
+    body = Part("block", mesh, Material(1, 0), (Support("rest"),), (), "foot")
+    with pytest.raises(InputError, match="'block' is held at all its nodes"):
+        run(Scene("held", body, Rigid("floor"), mu=0.1))
 
 
 @pytest.mark.parametrize(

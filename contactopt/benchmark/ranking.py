@@ -240,6 +240,6 @@ def warning(ratio: float) -> str:
     if not ratio > BUSY:
         return ""
     return (
-        f"The median of wall time over CPU time is {ratio:.2f}, above {BUSY:g}: the machine was"
-        " busy, so nothing is ranked."
+        f"Wall time over CPU time is {ratio:.2f}, a median over the methods, above {BUSY:g}: the"
+        " machine was busy, so nothing is ranked."
     )

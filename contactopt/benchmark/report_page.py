@@ -92,7 +92,7 @@ def report_campaign(
     text = write_report(layout, folder, table, figures)
     body = filled("report.html", title=html.escape(layout.title), static=_rendered(text, folder))
     data = page_data(table) | {"absent": _absent(rows)}
-    return write_html(folder / PAGE, layout.title, body, data, ["report.js"], plotly=False)
+    return write_html(folder / PAGE, layout.title, body, data, ["report.js"])
 
 
 def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:

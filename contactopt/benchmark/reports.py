@@ -106,7 +106,9 @@ def write_report(
             result, caption = _drawn(layout, number, entry, table), _one_line(entry["caption"])
             if result is None:
                 continue
-            if entry["kind"] in TABLES:
+            if isinstance(result, str):
+                parts.append(result)
+            elif entry["kind"] in TABLES:
                 parts += [_markdown(result), f"*Table {number}. {caption}*"]
             else:
                 picture, plain = f"figure-{number}.png", re.sub(r"[\[\]*`]", "", caption)
@@ -121,16 +123,17 @@ def write_report(
 
 
 def _drawn(layout: Experiment, number: int, entry: Mapping[str, Any], table: pd.DataFrame) -> Any:
-    """What a figure's function makes of its rows; None where no row fits an optional one."""
+    """What a figure's function makes of its rows; a sentence where none fits, and None where the
+    figure is optional.
+    """
     kind, where = entry["kind"], entry.get("where", {})
     arguments = {key: value for key, value in entry.items() if key not in OWN_KEYS}
     try:
         try:
             rows = select(table, **where)
-        except InputError:
-            if entry.get("optional"):
-                return None
-            raise
+        except InputError as error:
+            left = f"Number {number} ({kind}) is left out: {error}"
+            return None if entry.get("optional") else left
         if kind in TABLES:
             return TABLES[kind](rows, **arguments)
         # names are not formulas for Matplotlib to set
@@ -168,9 +171,9 @@ def _foot(layout: Experiment, folder: Path, table: pd.DataFrame) -> str:
     lines = [
         f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a"
         " certificate recomputed from the problem.",
-        f"The median of wall time over CPU time of the calls is {busy:.2f}. More than 1 means a"
-        f" busy machine, and above {BUSY:g} nothing is ranked. CPU times are compared, and time"
-        " limits are wall times.",
+        f"Wall time over CPU time of the calls is {busy:.2f}, a median over the methods. More than"
+        f" 1 means a busy machine, and above {BUSY:g} nothing is ranked. CPU times are compared,"
+        " and time limits are wall times.",
         f"Experiment: [`{layout.path.name}`]({link}); table: [`{name}`]({name}).",
         f"Made by {made}.",
         _one_line(f"Environment: {machines}. {versions}. One BLAS thread."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,22 @@ def select(table: pd.DataFrame, **where: Any) -> pd.DataFrame:
     if rows.empty:
         raise InputError(f"no row with {where}.")
     return rows
+
+
+def told(
+    table: pd.DataFrame, *findings: Callable[[pd.DataFrame], str | Sequence[str]]
+) -> list[str]:
+    """The sentences of the functions of a table; one whose rows are not there (InputError) says so
+    instead.
+    """
+    sentences: list[str] = []
+    for finding in findings:
+        try:
+            found = finding(table)
+        except InputError as error:
+            found = f"The table lacks the runs for the finding `{finding.__name__}`: {error}"
+        sentences += [found] if isinstance(found, str) else found
+    return sentences
 
 
 def success_table(table: pd.DataFrame, by: str = "method", across: str = "setting") -> pd.DataFrame:

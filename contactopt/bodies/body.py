@@ -47,6 +47,11 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
     A = isotropic_stiffness(basis, kind.constants(part.material), weight)
     fixed = _constrained(scene, part, basis)
+    if fixed.held.all():
+        raise InputError(
+            f"body '{part.name}' is held at all its nodes, so that nothing of it deforms; hold"
+            " fewer, or make it a rigid body."
+        )
     rigid_motions = free_motions(kind, basis, fixed.held, weight)
     check_free(part.name, A, rigid_motions)
     traces = {}
@@ -56,7 +61,10 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
         facets = np.asarray(mesh.boundaries[name])
         every = tied or bool(thin_facets(basis.mesh, facets).any())
         copied = copies(basis, scene.degree, facets, mesh, part.curve_of(name))
-        traces[name] = contact_trace(basis, scene.degree, facets, weight, every, copied)
+        try:
+            traces[name] = contact_trace(basis, scene.degree, facets, weight, every, copied)
+        except InputError as error:
+            raise InputError(f"body '{part.name}', boundary '{name}': {error}") from None
     return Assembly(
         part.name,
         kind,

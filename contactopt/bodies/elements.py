@@ -34,6 +34,7 @@ from skfem.refdom import RefLine, RefQuad, RefTri
 
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, is_curved
+from contactopt.meshes.mesh_repair import SAME, text
 
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
 _TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
@@ -215,7 +216,10 @@ def contact_trace(
     rows = rows.reshape(area.shape)
     areas = np.bincount(rows.ravel(), area.ravel())
     normals = np.stack([np.bincount(rows.ravel(), n.ravel()) for n in normal])
-    normals = normals / np.linalg.norm(normals, axis=0)
+    normals, opposite = unit(normals)
+    if opposite is not None:
+        node = copies[contacts[opposite]]
+        raise InputError(opposed(basis.doflocs[:, node_unknowns(basis)[0, node]]))
     # W_ij = int psi_i N_j / A_i, summed over the cells as the sparse matrix is made.
     value, row, column = np.broadcast_arrays(
         dual / areas[rows][..., None], rows[..., None], node[:, None, None, :]
@@ -227,6 +231,21 @@ def contact_trace(
     corners = rows.reshape(-1, rows.shape[2]).T
     # exact axes stay exact
     return Trace(copies[contacts], areas, _clean(normals), W, corners, faces, copies)
+
+
+def unit(normals: np.ndarray) -> tuple[np.ndarray, int | None]:
+    """Sums of normals (dim, k) made to unit length, and the first place where they cancel."""
+    length = np.linalg.norm(normals, axis=0)
+    lost = np.flatnonzero(length <= SAME * length.max(initial=0.0))
+    return normals / np.where(length > 0, length, 1.0), int(lost[0]) if len(lost) else None
+
+
+def opposed(place: np.ndarray) -> str:
+    """The sentence for a place whose normals cancel."""
+    return (
+        f"facets face opposite ways at ({text(place)}), so that the boundary has no"
+        " normal there; make a boundary of each side, with a contact of its own."
+    )
 
 
 def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:

@@ -233,7 +233,7 @@ def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
     """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
     size it misses it.
     """
-    cells = simplices(mesh, alike=False)
+    cells = simplices(mesh)
     origin = cells.p[:, cells.t[0]]
     edges = cells.p[:, cells.t[1:]] - origin[:, None]
     shares = np.linalg.solve(np.moveaxis(edges, 2, 0), (point[:, None] - origin).T[..., None])[

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody, Surface
+from contactopt.bodies.elements import opposed, unit
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes
@@ -96,11 +97,14 @@ def _without_copies(surface: Surface, outward: np.ndarray) -> Surface:
     share = np.where(towards | (np.bincount(own, towards) == 0)[own], surface.areas, 0.0)
     areas = np.bincount(own, share)
     M = sp.csr_matrix((share / areas[own], (own, np.arange(k))), (len(first), k))
-    normals = surface.normals @ M.T
+    normals, opposite = unit(surface.normals @ M.T)
+    if opposite is not None:
+        sentence = opposed(surface.points[:, first[opposite]])
+        raise InputError(f"body '{surface.body}': {sentence}")
     return replace(
         surface,
         points=surface.points[:, first],
-        normals=normals / np.linalg.norm(normals, axis=0),
+        normals=normals,
         areas=areas,
         weights=sp.csr_matrix(M @ surface.weights),
         traces=tuple(sp.csr_matrix(M @ trace) for trace in surface.traces),

@@ -188,7 +188,7 @@ def _with_bodies(problem: InterfaceProblem, linearised: Linearised, accuracy: fl
     coupled, none = Coupled(linearised.equations, form, P), form.pulled(np.zeros(problem.q.size))
 
     def approximate(rest: Stacked, rtol: float) -> Stacked:
-        return coupled.change(rest, linearised, rtol)
+        return coupled.solve(rest, linearised, rtol)
 
     def product(x: Stacked) -> Stacked:
         return coupled.product(linearised, x)

@@ -119,9 +119,7 @@ def _write(
         pairs="",
         cells=f"<tr><td>{lines.removeprefix('<br>')}</td></tr>",
     )
-    return write_html(
-        file, f"contactopt: {scene.name}", body, data, ["painter.js", "view.js"], plotly=False
-    )
+    return write_html(file, f"contactopt: {scene.name}", body, data, ["painter.js", "view.js"])
 
 
 def _bodies(scene: Scene, meshes: Mapping[str, Any], planes: list[Any]) -> list[dict[str, Any]]:

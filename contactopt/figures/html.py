@@ -1,9 +1,9 @@
-"""Pages that stand alone: one HTML file with its data, its program and plotly inside, which opens
-without a network.
+"""Pages that stand alone: one HTML file with its data and its program inside, which opens without
+a network.
 
-The data and plotly are stored compressed, at about a quarter of their size, and unpacked by the
-browser. Data are JSON; arrays are base64 of their bytes. Names in the data reach the page as text
-only, and the page may load nothing from elsewhere.
+The data are stored compressed, at about a quarter of their size, and unpacked by the browser. They
+are JSON; arrays are base64 of their bytes. Names in the data reach the page as text only, and the
+page may load nothing from elsewhere.
 """
 
 from __future__ import annotations
@@ -14,30 +14,20 @@ import html
 import json
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path
 from string import Template
 from typing import Any
 
 import numpy as np
 
-from contactopt.defaults import install
-from contactopt.errors import InputError
 from contactopt.files.writing import whole_file
 
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval';"
-    " style-src 'unsafe-inline'; img-src data: blob:"
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 )
 KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}
 
 SHORT = 65535  # the largest number of two bytes
-
-
-def check_installed() -> None:
-    """Raise InputError unless plotly is installed, of which the pages hold a copy."""
-    if find_spec("plotly") is None:
-        raise InputError(f"pages to explore need plotly; {install('view')}.")
 
 
 def packed(array: Any) -> dict[str, Any]:
@@ -65,16 +55,13 @@ def write_html(
     body: str,
     data: Mapping[str, Any],
     programs: Sequence[str],
-    plotly: bool = True,
 ) -> Path:
     """Write a page that stands alone.
 
     `body` is HTML with every name in it escaped, between the header with its title, plain text, and
-    the programs: JavaScript files in contactopt/figures/pages, run in this order. With `plotly`
-    they may await plotly() before they draw a chart. They read `data`, anything that JSON
-    can hold. InputError if plotly is not installed, or the file cannot be written.
+    the programs: JavaScript files in contactopt/figures/pages, run in this order. They read
+    `data`, anything that JSON can hold. InputError if the file cannot be written.
     """
-    packed = _plotly() if plotly else ""
     texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}
     encoded = _squeezed(json.dumps(data, allow_nan=False))
     parts = [
@@ -87,20 +74,11 @@ def write_html(
         f"<script>{texts['start.js']}\nstart(async () => {{\n"
         + "\n".join(texts[name] for name in programs)
         + "\n});</script>",
-        f'<script type="text/plain" id="plotly">{packed}</script>',  # not before the picture
         "</body></html>\n",
     ]
     with whole_file(file) as beside:
         beside.write_text("".join(parts), encoding="utf-8")
     return Path(file)
-
-
-def _plotly() -> str:
-    """The program of plotly, compressed, as text."""
-    check_installed()
-    from plotly.offline import get_plotlyjs
-
-    return _squeezed(get_plotlyjs())
 
 
 def _squeezed(text: str) -> str:

@@ -24,8 +24,8 @@ from contactopt.coupling.posed import Posed, posed, problem_of
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.unbalanced_loads import escape, sentence
-from contactopt.readings.plausibility import doubts
+from contactopt.problem.unbalanced_loads import escape, loose_names, sentence, sorted_motions
+from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
 
@@ -82,7 +82,8 @@ def check_scene(
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
     coupled = [text for own in made.couplings for text in own.remarks]
-    notes = [*told, *heard, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
+    told = list(dict.fromkeys([*told, *said_of_meshes(scene), *heard]))
+    notes = [*told, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
@@ -161,11 +162,8 @@ def _balance(states: Sequence[Scene], made: Posed, free: InterfaceProblem) -> li
             found.append(where + sentence(problem, gone))
     if found or not free.motions:
         return found[:1]
-    held = np.zeros(free.q.shape, dtype=bool)
-    held[:, 0] = True
-    held[:, 1:] = (np.asarray(free.law.rough) & (free.mu > 0))[:, None]
-    loose = kernel(np.asarray(free.V)[held.ravel()], free.motions)[1]
-    return [f"neither supports nor contacts resist a motion of {name}" for name in loose]
+    names = loose_names(free, sorted_motions(free)[1])
+    return [f"neither supports nor contacts resist a motion of {name}" for name in names]
 
 
 def _posed_again(state: Scene, made: Posed) -> Posed:

@@ -23,21 +23,18 @@ import numpy as np
 from contactopt.cards import columns
 from contactopt.checks import short
 from contactopt.errors import InputError
-from contactopt.figures.html import check_installed, filled, write_html
+from contactopt.figures.html import filled, write_html
 from contactopt.figures.page_data import page_data
 from contactopt.outcome import pair_rows, summary_rows
-
-__all__ = ["check_installed", "write_page"]
 
 
 def write_page(folder: str | Path, file: str | Path) -> Path:
     """Write the page of a run to a file that ends in .html.
 
     The folder holds what `contactopt run` wrote: summary.json, interface.npz, VTU files, and
-    path.npz with history.csv of a load path. InputError if plotly is not installed, or if the
-    folder is not that of a run.
+    path.npz with history.csv of a load path. InputError if the folder is not
+    that of a run.
     """
-    check_installed()
     folder = Path(folder)
     try:
         silent = io.StringIO()

@@ -43,6 +43,8 @@ POINTS = re.compile(
     "CELAS|CDAMP|CMASS|CBUSH|CGAP|CVISC|CONM|CFAST|CWELD|CBEAR|CSEAM|CHBDY|CORD|CREEP|CYSYM|CYJOIN"
     "|CYAX|CSUPER|CSET|COUPLE|CAERO|CLOAD|CONV|CONVM|CBARAO|CSSCHD|CAMPBLL"
 )
+# properties that give shells and lines a stiffness
+SECTIONS = re.compile("P(BAR|BEAM|COMP|ROD|SHEAR|SHELL|TUBE)")
 # the order of meshio: edges along the third axis come last
 HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15]
 Card = tuple[int, list[str]]
@@ -63,6 +65,7 @@ def read_bulk_data(path: Path) -> Any:
     tags = np.array(sorted(reader.nodes), dtype=np.int64)
     if not len(tags) or not reader.elements:
         raise ValueError("it holds no nodes or no elements")
+    reader.tell_sections()
     points = np.array([reader.nodes[tag] for tag in tags.tolist()])
     cells, groups = [], []
     for kind, rows in reader.elements.items():
@@ -87,6 +90,7 @@ class _Reader:
         self.elements: dict[str, list[tuple[int, int, list[int]]]] = {}
         self.numbers: set[int] = set()
         self.passed: set[str] = set()
+        self.sections: set[int] = set()
 
     def fail(self, line: int, message: str) -> InputError:
         return InputError(f"mesh file '{self.path}', line {line}: {message}.")
@@ -118,10 +122,23 @@ class _Reader:
             raise self.fail(line, "nodes are in a coordinate system of their own; write them in 0")
         elif name in ELEMENTS:
             self._element(line, card)
+        elif SECTIONS.match(name):
+            self.sections.add(self.whole(line, "".join(card[1:2])))
         elif POINTS.match(name):
             self.passed |= set() if name.startswith("CORD") else {name}
         elif name in ("INCLUDE", "PLOTEL3", "PLOTEL4", "CONROD") or name.startswith("C"):
             raise self.fail(line, f"the card {name} is not known here; write the mesh without it")
+
+    def tell_sections(self) -> None:
+        """Warn of elements thinner than a body that have a property: they stiffen no body."""
+        thin: tuple[str, ...] = "line", "tri", "quad"
+        if all(kind.startswith(thin) for kind in self.elements):
+            thin = ("line",)
+        for kind, rows in self.elements.items():
+            lines = [line for line, group, _ in rows if group in self.sections]
+            if kind.startswith(thin) and lines:
+                said = "%s, line %d: the stiffness of %d elements of type %s is left out"
+                log.warning(said, self.path, lines[0], len(lines), kind)
 
     def _element(self, line: int, card: list[str]) -> None:
         name, first = card[0], FIRST.get(card[0], 3)

@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
 from contactopt.meshes.inp_elements import CORNERS, FACET, dimension, kind_of, side_of
-from contactopt.meshes.inp_text import LARGEST, Block, Named, bare, blocks, set_of
+from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Named, bare, blocks, set_of
 from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
@@ -53,7 +53,7 @@ def read_inp(path: Path) -> Any:
         elif what == "part":
             now = whole
         elif not verb and block.keyword != "assembly":
-            getattr(now, block.keyword)(block)
+            getattr(now, "section" if block.keyword in SECTIONS else block.keyword)(block)
         block.rows = []
         if verb and opened.pop(what, None) is None:
             raise block.fail(f"there is no *{what.upper()} that it ends")
@@ -72,6 +72,7 @@ def read_inp(path: Path) -> Any:
     whole.name_sets()
     if whole.passed:
         log.warning("%s: elements without extent are left out: %s", path, ", ".join(whole.passed))
+    whole.tell_sections()
     cells = [(kind, nodes, ids) for kind, nodes, ids, _ in whole.blocks if kind] + whole.facets()
     tags = np.array(sorted(whole.nodes), dtype=np.int64)
     points = np.array([whole.nodes[tag] for tag in tags.tolist()]).reshape(-1, 3)
@@ -120,6 +121,7 @@ class Scope:
         self.unsorted: set[str] = set()
         self.surfaces: dict[str, list[tuple[Iterable[int], str, Block, int]]] = {}
         self.passed: dict[str, int] = {}  # types of elements
+        self.sections: list[tuple[Scope, int, Block]] = []  # where their sets are, as for instances
         self.instances: dict[str, tuple[Scope, int]] = {}  # with what numbers grow by
         self.name = ""
         self.frame = np.zeros(3), Rotation.identity()  # of *SYSTEM: origin, directions
@@ -144,6 +146,7 @@ class Scope:
         places = own.move(np.array(list(own.nodes.values())).reshape(-1, 3))
         self.nodes |= zip((tag + by for tag in own.nodes), map(tuple, places.tolist()))
         self.elements.update(i + by for i in own.elements)
+        self.sections += [(own, by, block) for _, _, block in own.sections]
         for name, count in own.passed.items():
             self.passed[name] = self.passed.get(name, 0) + count
         for number, (kind, nodes, ids, where) in enumerate(own.blocks):
@@ -194,6 +197,23 @@ class Scope:
                         word = f"{what or 'element'} {number % LARGEST}"
                         raise block.fail(f"'{name}' names {word}, which is not there", line)
                     del found[number]
+
+    def section(self, block: Block) -> None:
+        self.sections.append((self, 0, block))
+
+    def tell_sections(self) -> None:
+        """Warn of shells and lines beside solids, or lines beside plane elements, that have a
+        section: they may name boundaries, but stiffen no body.
+        """
+        most = max(dimension(named) for named in self.types.values())
+        for own, by, block in self.sections:
+            sets = {bare(name): found for name, found in own.element_sets.items()}
+            members = sets.get(bare(block.options.get("elset", "")), ())
+            for place, (_, _, ids, _) in enumerate(self.blocks):
+                count = len(_places(ids - by, members))
+                if count and 0 < dimension(self.types[place]) < most:
+                    said = "%s, line %d: the stiffness of %d elements %s is left out"
+                    log.warning(said, block.path, block.line, count, self.types[place])
 
     def system(self, block: Block) -> None:
         """Coordinates of nodes are from now on those in other directions from another origin."""

@@ -36,6 +36,11 @@ READ = {
     "part": "name", "assembly": "name", "instance": "name part",
     "endpart": "", "endassembly": "", "endinstance": "",
 }  # fmt: skip
+# keywords that give elements a stiffness, with any options
+SECTIONS = {
+    *("beamsection", "beamgeneralsection", "framesection", "membranesection"),
+    *("shellsection", "shellgeneralsection", "solidsection"),
+}
 DEEPEST = 10  # files that include each other
 LARGEST = 2**31  # numbers of nodes and elements are smaller
 COMMA = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')  # not within quotation marks
@@ -126,6 +131,9 @@ def _goes_on(text: str, after: str) -> bool:
 
 def _known(block: Block, stepping: bool, depth: int) -> Iterator[Block]:
     """A block that is read, with the data of other files, or nothing for one without effect."""
+    if block.keyword in SECTIONS:
+        yield block
+        return
     if block.keyword not in READ:
         if not stepping and block.keyword not in harmless():
             raise block.fail(

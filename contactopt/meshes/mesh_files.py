@@ -8,15 +8,17 @@ a boundary of each. contactopt.meshes.mesh_repair holds what is repaired and wha
 from __future__ import annotations
 
 import logging
-from collections.abc import Container, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import skfem
 
-from contactopt.checks import check_number
+from contactopt.cards import count
+from contactopt.checks import check_number, overheard, remember
 from contactopt.errors import InputError
+from contactopt.meshes.inp_elements import FACES
 from contactopt.meshes.mesh_formats import FileGroups, read_groups
 from contactopt.meshes.mesh_repair import (
     CORNERS,
@@ -56,7 +58,10 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
         repaired.
     """
     check_number("the scale of a mesh", scale, low=0.0)
-    return _body(Path(path), read_groups(Path(path)), group, scale)
+    with overheard() as told:
+        groups = read_groups(Path(path))
+        _tell_others(Path(path), groups)
+        return remember(_body(Path(path), groups, group, scale), told)
 
 
 def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
@@ -64,6 +69,7 @@ def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
     For each group that is no body, such as several in one, a sentence says why.
     """
     groups = read_groups(path)
+    _tell_others(path, groups)
     found: dict[str | None, skfem.Mesh] = {}
     refused: list[str] = []
     dim = _place(path, groups)[0]
@@ -259,7 +265,6 @@ def _boundaries(
     corners = np.sort(mesh.facets[:, outer], axis=0)
     place = {tuple(facet): i for i, facet in enumerate(corners.T.tolist())}
     found: dict[str, np.ndarray] = {}
-    _tell_others(mesh, groups, dim, number, place)
     for name in groups.names(dim - 1):
         hits, others = [], list[tuple[int, ...]]()
         for i, elements in groups.members[name, dim - 1].items():
@@ -287,23 +292,31 @@ def _boundaries(
     return found
 
 
-def _tell_others(
-    mesh: skfem.Mesh, groups: FileGroups, dim: int, number: np.ndarray, outer: Container[Any]
-) -> None:
-    """Warn of shells and lines that are no side of the body, where this is the whole file."""
-    count, inner = 0, None
-    if mesh.nelements != sum(len(nodes) for _, nodes, own in groups.blocks if own == dim):
+def _tell_others(path: Path, groups: FileGroups) -> None:
+    """Warn of shells and lines that are no side or edge of an element of a body. A sum of random
+    numbers of the corners, which are equal where nodes lie on each other, is the key of each.
+    """
+    dim = max(dims for _, nodes, dims in groups.blocks if len(nodes))
+    others = [(kind, nodes, dims) for kind, nodes, dims in groups.blocks if 0 < dims < dim]
+    if not others:
         return
-    for kind, nodes, own in groups.blocks:
-        if own == dim - 1:
-            corners = nodes[:, : 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])]
-            keys = map(tuple, np.sort(number[corners], axis=1).tolist())
-            if others := [key for key in keys if key not in outer]:
-                inner = _inner(mesh) if inner is None else inner
-                count += sum(key not in inner for key in others)
-    if count:
-        said = "%d %s of the file are no sides of elements of the body: they are left out"
-        log.warning(said, count, "shells" if dim == 3 else "lines")
+    size = np.ptp(groups.points, axis=0).max() or 1.0
+    places = np.unique(np.round(groups.points / (SAME * size)), axis=0, return_inverse=True)[1]
+    numbers = np.random.default_rng(0).integers(0, 2**63, len(groups.points), dtype=np.uint64)
+    key = numbers[places.ravel()]
+    sides = [np.zeros(0, dtype=np.uint64)]
+    for kind, nodes, dims in groups.blocks:
+        for face in FACES.get(kind.rstrip("0123456789"), ()) if dims == dim else ():
+            sides.append(key[nodes[:, list(face)]].sum(axis=1))
+            sides += [key[nodes[:, [i, j]]].sum(axis=1) for i, j in zip(face, face[-1:] + face)]
+    known, lost = np.unique(np.concatenate(sides)), {1: 0, 2: 0}
+    for kind, nodes, dims in others:
+        corners = nodes[:, : 2 if dims == 1 else CORNERS.get(kind, nodes.shape[1])]
+        lost[dims] += int(np.count_nonzero(~np.isin(key[corners].sum(axis=1), known)))
+    for dims, what in ((1, "line"), (2, "shell")):
+        if lost[dims]:
+            said = "%s: %s off the sides and edges of all elements of bodies, left out"
+            log.warning(said, path, count(lost[dims], what))
 
 
 def _inner(mesh: skfem.Mesh) -> set[tuple[int, ...]]:

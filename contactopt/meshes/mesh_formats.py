@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import pickle
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -26,11 +27,12 @@ from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
 from contactopt.meshes.med import read_med
 from contactopt.meshes.msh4 import parametric, read_msh4, read_parametric, version
+from contactopt.meshes.su2 import read_su2
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
 # arrays of integers per element whose numbers are groups; those of others are named 'array=number'
 TAGS = (
-    *("gmsh:physical", "medit:ref", "su2:tag", "nastran:ref"),
+    *("gmsh:physical", "medit:ref", "nastran:ref"),
     *("avsucd:material", "flac3d:group", "netgen:index"),
 )
 # formats whose readers end on damaged text; others may not
@@ -41,7 +43,9 @@ OWN: dict[str, Callable[[Path], Any]] = {
     "exodus": read_exodus,
     "med": read_med,
     "nastran": read_bulk_data,
+    "su2": read_su2,
 }
+SECOND = re.compile(rb"\s*[A-Z][a-z]+[PQ][2-9]\s*$")  # keywords of Medit
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
 CHILD = """import contextlib, pickle, sys, meshio
@@ -182,6 +186,14 @@ def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[],
     if binary:  # meshio trusts the counts of damaged files
         yield partial(_read_apart, path, "gmsh", size)
         return
+    if "medit" in formats:
+        with path.open("rb") as file:
+            curved = next((line.strip() for line in file if SECOND.match(line)), None)
+        if curved is not None:
+            raise InputError(
+                f"mesh file '{path}': elements of second order ({curved.decode()}) are not read"
+                " from this format; save it as .msh or .inp."
+            )
     for name in sorted(formats, key=lambda name: name not in SAFE):
         if name in OWN:
             yield partial(OWN[name], path)

@@ -17,6 +17,8 @@ MOST_CELLS = 2e7  # of one mesh
 NEEDED = 6e3  # bytes of memory that a run takes for each cell, at least
 # shortest cell over the length of a grid; below it, places of nodes are lost in rounding
 FINEST = 1e-8
+# a direction that no usual edge or diagonal of a cell is perpendicular to
+LEAN = np.array([np.sqrt(3), np.sqrt(2), -1.0])
 
 
 def graded(length: float, first: float, growth: float) -> np.ndarray:
@@ -138,24 +140,19 @@ def patch(
     return mesh.with_boundaries({name: facets[inside]})
 
 
-def simplices(mesh: Mesh, alike: bool = True) -> MeshTri | MeshTet:
+def simplices(mesh: Mesh) -> MeshTri | MeshTet:
     """Every quadrilateral cut into two triangles, every hexahedron into six tetrahedra, with
     straight edges and the same boundaries; triangles and tetrahedra stay whole.
 
-    All cells are cut in the same way, so that bodies match whose meshes had the same cells on their
-    contact faces. InputError where `alike` asks for that and neighbours meet at crossed diagonals.
+    A side of a hexahedron is cut by the diagonal through its first corner along LEAN. Neighbours
+    thus cut a common side alike, and so do bodies whose meshes match.
     """
     mesh = straight(mesh)
     if isinstance(mesh, MeshTri | MeshTet):
         return mesh
     bare = replace(mesh, _boundaries=None)
-    cut = bare.to_meshtri() if isinstance(mesh, MeshQuad) else bare.to_meshtet()
+    cut = bare.to_meshtri() if isinstance(mesh, MeshQuad) else MeshTet(mesh.p, _tetrahedra(mesh))
     facets = cut.boundary_facets()
-    if alike and len(facets) != (len(mesh.p) - 1) * len(mesh.boundary_facets()):
-        raise InputError(
-            "the mesh cannot be cut into simplices: its cells number their vertices in different"
-            " orders; make a mesh of triangles or tetrahedra, or number all cells in one order."
-        )
     if not mesh.boundaries:
         return cut
     # those of the cell that each outer facet comes from
@@ -165,3 +162,26 @@ def simplices(mesh: Mesh, alike: bool = True) -> MeshTri | MeshTet:
     origin = sides[np.argmax(inside, axis=0), np.arange(len(facets))]
     names = {name: facets[np.isin(origin, old)] for name, old in mesh.boundaries.items()}
     return cut.with_boundaries(names)
+
+
+def _tetrahedra(mesh: MeshHex) -> np.ndarray:
+    """The corners (4, 6 cells) of six tetrahedra in each hexahedron, cell by cell in each sixth:
+    from its first corner along LEAN to the two halves of each of the three sides opposite to it.
+
+    Source: Dompierre et al. (1999), How to subdivide pyramids, prisms and hexahedra into
+    tetrahedra.
+    """
+    rank = np.argsort(np.argsort(LEAN @ mesh.p, kind="stable"))
+    first = np.argmin(rank[mesh.t], axis=0)
+    made = np.empty((4, 6, mesh.nelements), int)
+    for corner in range(8):
+        cells = np.flatnonzero(first == corner)
+        opposite = [side for side in mesh.refdom.facets if corner not in side]
+        made[0][:, cells] = mesh.t[corner, cells]
+        for number, side in enumerate(opposite):
+            around = mesh.t[side][:, cells]
+            turn = np.argmin(rank[around], axis=0) + np.arange(4)[:, None]
+            a, b, c, d = np.take_along_axis(around, turn % 4, axis=0)
+            made[1:, 2 * number, cells] = a, b, c
+            made[1:, 2 * number + 1, cells] = a, c, d
+    return made.reshape(4, -1)

@@ -21,8 +21,8 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
+from contactopt.methods.kernels.damped import solve_subproblem
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
-from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 

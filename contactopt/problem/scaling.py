@@ -23,12 +23,14 @@ class Scales:
     """Units in which a problem is dimensionless: force, length, and one length per multiplier.
 
     stretch  (k, dim - 1, dim - 1) what takes its tangential forces back (`isotropic`), or None
+    basis    (p, m) of the multipliers that the dimensionless problem has, or None for all
     """
 
     force: float
     length: float
     multipliers: np.ndarray
     stretch: np.ndarray | None = None
+    basis: np.ndarray | None = None
 
     def to_physical(
         self, reactions: np.ndarray, multipliers: np.ndarray
@@ -37,7 +39,10 @@ class Scales:
         if self.stretch is not None:
             tangential = np.einsum("kab,kb->ka", self.stretch, reactions[:, 1:])
             reactions = np.column_stack([reactions[:, 0], tangential])
-        return reactions * self.force, multipliers * self.multipliers
+        multipliers = multipliers * self.multipliers
+        if self.basis is not None:
+            multipliers = self.basis @ multipliers
+        return reactions * self.force, multipliers
 
     def to_dimensionless(
         self, reactions: np.ndarray, multipliers: np.ndarray
@@ -46,6 +51,8 @@ class Scales:
         if self.stretch is not None:
             tangential = np.linalg.solve(self.stretch, reactions[:, 1:, None])[:, :, 0]
             reactions = np.column_stack([reactions[:, 0], tangential])
+        if self.basis is not None:
+            multipliers = np.linalg.lstsq(self.basis, multipliers, rcond=None)[0]
         return reactions / self.force, multipliers / self.multipliers
 
 

@@ -97,7 +97,7 @@ def _share(part: Any, scene: Any, place: np.ndarray, reach: float) -> float:
     """The share of the full angle that a body fills around a place on its boundary: half of it away
     from its vertices.
     """
-    cells = simplices(straight(part.build_mesh(scene.elements, scene.zone)), alike=False)
+    cells = simplices(straight(part.build_mesh(scene.elements, scene.zone)))
     away = np.linalg.norm(cells.p - place[:, None], axis=0)
     vertex = int(np.argmin(away))
     return filled(cells, vertex) if away[vertex] <= reach else 0.5
@@ -110,7 +110,7 @@ def re_entrant(mesh: Any, vertex: int) -> bool:
     The recovered stress at the corner itself looks from all sides, and may be less than that next
     to it.
     """
-    cells = simplices(mesh, alike=False)
+    cells = simplices(mesh)
     near = np.array([vertex])
     for _ in range(2):
         near = np.unique(cells.t[:, np.any(np.isin(cells.t, near), axis=0)])

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
 from contactopt.scenes.material_library import STRESSES
 from contactopt.scenes.scene import Part, Scene
@@ -28,6 +29,12 @@ def doubts(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]
     found += [note for part in meshed for note in _faint_loads(scene, part)]
     return [*found, *_stiffness(scene), *_sizes(meshed), *_gaps(scene, couplings)]
+
+
+def said_of_meshes(scene: Scene) -> list[str]:
+    """What was said of the meshes of a scene when their files were read."""
+    given = [part.mesh for part in scene.meshed.values() if part.given]
+    return [text for mesh in given for text in remembered(mesh)]
 
 
 def _loaded_contacts(scene: Scene, part: Part) -> list[str]:

@@ -125,21 +125,25 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     return {"bodies": bodies, "pairs": pairs}, remarks if solution.solved else []
 
 
-def check_possible(limits: dict[str, Any], couplings: Sequence[Coupling]) -> None:
-    """Raise InputError where a body is squeezed to nothing, and not at the tip of a corner alone,
-    by the tables of validity().
+def impossible(limits: dict[str, Any], couplings: Sequence[Coupling], refuse: bool) -> list[str]:
+    """The sentence for a body that is squeezed to nothing, and not at the tip of a corner alone, by
+    the tables of validity(). InputError with it, to `refuse`, if surfaces overlap or it is more.
     """
     overlaps = any(
         -own.gap.min() > SHARE * np.ptp(own.positions, axis=1).max() for own in couplings
     )
     most = SQUEEZED if overlaps else IMPOSSIBLE
     for name, known in limits["bodies"].items():
-        if known["mean_strain"] > BOUNDS["strain"] and known["strain"] > most:
-            raise InputError(
+        if known["mean_strain"] > BOUNDS["strain"] and known["strain"] > SQUEEZED:
+            told = (
                 f"no body can deform like this: the answer has a strain of {known['strain']:.3g} in"
                 f" body '{name}'; see whether E and the loads are in the same unit, whether the"
                 " surfaces that may touch are the right ones, and how far they overlap."
             )
+            if refuse and known["strain"] > most:
+                raise InputError(told)
+            return [told]
+    return []
 
 
 def _beyond(key: str, where: str, value: float) -> list[str]:

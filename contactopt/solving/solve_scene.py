@@ -21,9 +21,10 @@ from contactopt.errors import InputError
 from contactopt.linear.budget import NextBest, TooDear, open_budget
 from contactopt.linear.convolution import Convolution
 from contactopt.linear.operators import InterfaceOperator, loosened
+from contactopt.methods.auto import Auto
 from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.transfer import transfer
 from contactopt.readings.constants import BALANCED, BEARABLE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
 from contactopt.readings.validity import validity
@@ -35,6 +36,9 @@ from contactopt.solving.sliding import sliding, sliding_words
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
+# Steps of the default method, of which those of Newton and along interior paths are some forty,
+# until it is asked whether a state slides. One that does not begins anew, without this bound.
+FIRST_TRY = 64
 STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselves
 
 
@@ -205,6 +209,17 @@ def _solved(
 
     def answer(problem: InterfaceProblem, start: Solution | None) -> Solution:
         found = certified(problem, start, options.tol)
+        usual = (
+            options.method in (None, "auto", Auto()) and "max_iterations" not in options.settings
+        )
+        if found is None and usual and problem.motions:
+            few: dict[str, Any] = {
+                "progress": lines,
+                "max_iterations": FIRST_TRY,
+            } | options.of_solve
+            tried = solve(problem, start=start, **few)
+            ended = tried.status is not Status.ITERATION_LIMIT
+            found = tried if ended or sliding(problem, tried, start) else None
         return found or solve(problem, start=start, **({"progress": lines} | options.of_solve))
 
     seconds = Counter(reduction.seconds)

@@ -4,31 +4,43 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactopt.benchmark.tables import select, told
+
 
 def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
-    units, copies, nu = (
-        table[table["family"] == name] for name in ("in_units", "redundant", "punch-2d")
+    return told(table, units, copies, compressibility)
+
+
+def units(table) -> str:  # type: ignore[no-untyped-def]
+    rows = select(table, family="in_units")
+    counts = rows.groupby("method")["iterations"].nunique()
+    force, length = (
+        round(np.log10(rows[name].max() / rows[name].min()))
+        for name in ("problem.force", "problem.length")
     )
-    counts = units.groupby("method")["iterations"].nunique()
-    decades = [
-        round(np.log10(units[c].max() / units[c].min()))
-        for c in ("problem.force", "problem.length")
-    ]
     varying = counts[counts > 1].index.tolist()
-    return [
-        f"Units: {_share(units)} runs are certified over {decades[0]} decades of force and"
-        f" {decades[1]} of length. The number of iterations is the same in all of them for"
+    return (
+        f"Units: {_share(rows)} runs are certified over {force} decades of force and"
+        f" {length} of length. The number of iterations is the same in all of them for"
         f" {len(counts) - len(varying)} of {len(counts)} methods"
-        + (f" (not for {', '.join(f'`{m}`' for m in varying)})." if varying else "."),
-        (
-            f"Redundant contacts: {_share(copies)} runs are certified, up to"
-            f" {copies['problem.copies'].max():.0f} copies. Failures: {_failures(copies)}."
-        ),
-        (
-            f"Towards incompressibility {_share(nu)} runs are certified, and the largest Poisson's"
-            f" ratio is {nu['problem.upper_nu'].max():g}. Failures: {_failures(nu)}."
-        ),
-    ]
+        + (f" (not for {', '.join(f'`{m}`' for m in varying)})." if varying else ".")
+    )
+
+
+def copies(table) -> str:  # type: ignore[no-untyped-def]
+    rows = select(table, family="redundant")
+    return (
+        f"Redundant contacts: {_share(rows)} runs are certified, up to"
+        f" {rows['problem.copies'].max():.0f} copies. Failures: {_failures(rows)}."
+    )
+
+
+def compressibility(table) -> str:  # type: ignore[no-untyped-def]
+    rows = select(table, family="punch-2d")
+    return (
+        f"Towards incompressibility {_share(rows)} runs are certified, and the largest Poisson's"
+        f" ratio is {rows['problem.upper_nu'].max():g}. Failures: {_failures(rows)}."
+    )
 
 
 def _share(rows) -> str:  # type: ignore[no-untyped-def]

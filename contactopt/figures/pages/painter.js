@@ -153,14 +153,3 @@ class Painter {
     for (const value of names ? names.keys() : ticks(low, high, wide > 600 ? 7 : 4)) this.text(names ? names[value] : short(value), left + (length * (value - low)) / (high - low), y + 19);
   }
 }
-
-function ticks(low, high, most) {  // round numbers between two numbers
-  const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough)), step = [1, 2, 5, 10].find((m) => m * power >= rough * 0.999) * power;
-  const first = Math.ceil(low / step - 1e-9), count = Math.floor(high / step + 1e-9) - first + 1;
-  return Array.from({length: Math.max(0, Math.min(count, 50))}, (_, i) => (first + i) * step);
-}
-
-function short(value) {  // as on an axis: 70000000 is 7e7
-  const rounded = Number(value.toPrecision(6));
-  return (Math.abs(rounded) < 1e6 ? String(rounded) : rounded.toExponential().replace("e+", "e")).replace("-", "\u2212");
-}

@@ -12,6 +12,8 @@ function colour(method) {  // the first leaders of these problems have a colour,
   return place < data.colours.length ? data.colours[place] : GREY;
 }
 
+const LOGS = {x: "log", y: "log"}, look = (method) => ({name: method, ink: colour(method), wide: colour(method) === GREY ? 1.2 : 2});
+
 function link(kind, name) {
   const made = element("a", name, {href: `#${kind}=${encodeURIComponent(name)}`});
   return made;
@@ -47,40 +49,6 @@ function table(id, columns, rows) {  // columns: [title, key, kind of link]
   fill(rows);
 }
 
-function svg(name, attributes, text = "") {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  if (text) made.textContent = text;
-  return made;
-}
-
-function chart(id, lines, across, up, options = {}) {  // lines: {name, x, y, dots}; the x axis is logarithmic
-  const W = 560, H = 330, L = 62, R = 12, T = 8, B = 44, picture = svg("svg", {viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${up} against ${across}`});
-  const seen = lines.map((line) => ({...line, at: line.x.map((x, i) => [x, line.y[i]]).filter(([x, y]) => x > 0 && (options.share ? y >= 0 : y > 0))})).filter((line) => line.at.length);
-  get(id).replaceChildren();
-  if (!seen.length) { get(id).append(element("p", "Nothing is known here.", {class: "note"})); return; }
-  const xs = seen.flatMap((line) => line.at.map(([x]) => Math.log10(x))), ys = options.share ? [0, 1] : seen.flatMap((line) => line.at.map(([, y]) => Math.log10(y)));
-  const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs) + 1e-3, Math.min(...ys), Math.max(...ys) + 1e-3];
-  const X = (x) => L + (W - L - R) * (Math.log10(x) - x0) / (x1 - x0), Y = (y) => H - B - (H - B - T) * ((options.share ? y : Math.log10(y)) - y0) / (y1 - y0);
-  const power = (k) => k >= 0 && k < 4 ? String(10 ** k) : `1e${k}`;
-  const step = (low, high) => Math.max(1, Math.ceil((high - low) / 7));
-  for (let k = Math.ceil(x0); k <= x1; k += step(x0, x1)) picture.append(svg("path", {d: `M${X(10 ** k)} ${T}V${H - B}`, stroke: "#ddd"}), svg("text", {x: X(10 ** k), y: H - B + 16, "text-anchor": "middle"}, power(k)));
-  const marks = options.share ? [0, 0.25, 0.5, 0.75, 1] : [];
-  if (!options.share) for (let k = Math.ceil(y0); k <= y1; k += step(y0, y1)) marks.push(10 ** k);
-  for (const y of marks) picture.append(svg("path", {d: `M${L} ${Y(y)}H${W - R}`, stroke: "#ddd"}), svg("text", {x: L - 5, y: Y(y) + 4, "text-anchor": "end"}, options.share ? `${100 * y} %` : power(Math.round(Math.log10(y)))));
-  picture.append(svg("text", {x: (L + W) / 2, y: H - 6, "text-anchor": "middle"}, across), svg("text", {x: 14, y: H / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${H / 2})`}, up));
-  for (const line of [...seen].reverse()) {
-    const ink = colour(line.name), path = line.at.map(([x, y], i) => i === 0 ? `M${X(x)} ${Y(y)}` : options.share ? `H${X(x)}V${Y(y)}` : `L${X(x)} ${Y(y)}`).join("");
-    const drawn = svg("path", {d: path, fill: "none", stroke: ink, "stroke-width": ink === GREY ? 1.2 : 2});
-    drawn.append(svg("title", {}, line.name));
-    picture.append(drawn);
-    if (line.dots) for (const [x, y] of line.at) { const dot = svg("circle", {cx: X(x), cy: Y(y), r: 3.5, fill: ink}); dot.append(svg("title", {}, `${line.name}: ${short(y)} after ${short(x)} s`)); picture.append(dot); }
-  }
-  const legend = element("p", "", {class: "legend"});
-  for (const line of seen) { const one = element("span", line.name); one.style.setProperty("--ink", colour(line.name)); legend.append(one); }
-  get(id).append(picture, legend);
-}
-
 function drawLeaders() {
   const chosen = leaders(), ranked = !data.busy;
   if (!chosen) return;
@@ -93,10 +61,10 @@ function drawLeaders() {
   const best = members.map((p) => Math.min(...times[p].map((t) => t ?? Infinity)));
   const solvable = members.map((p, i) => [p, best[i]]).filter(([, t]) => Number.isFinite(t));
   const most = Math.max(2, ...solvable.flatMap(([p, t]) => times[p].filter((s) => s !== null).map((s) => s / t)));
-  chart("profile", chosen.rows.map((row) => {
+  chart(get("profile"), chosen.rows.map((row) => {
     const m = data.methods.indexOf(row.method), ratios = solvable.map(([p, t]) => times[p][m] === null ? Infinity : times[p][m] / t).filter(Number.isFinite).sort((a, b) => a - b);
-    return {name: row.method, x: [1, ...ratios, most], y: [0, ...ratios.map((_, i) => (i + 1) / solvable.length), ratios.length / solvable.length]};
-  }), "CPU time over the best method's [-]", "share of the problems solved", {share: true});
+    return {...look(row.method), steps: true, x: [1, ...ratios, most], y: [0, ...ratios.map((_, i) => (i + 1) / solvable.length), ratios.length / solvable.length]};
+  }), "CPU time over the best method's [-]", "share of the problems solved", {x: "log", y: "share"});
 }
 
 function drawSolver(name) {
@@ -115,8 +83,8 @@ function drawProblem(name) {
   get("choose-problem").value = name;
   get("tags").textContent = Object.entries(data.problems[p].tags).map(([key, value]) => `${key} ${short(value)}`).join(", ");
   const named = data.order.filter((method) => own.some((run) => run.method === method));
-  chart("speed", named.map((method) => { const same = own.filter((run) => run.method === method); return {name: method, x: same.map((run) => run.cpu), y: same.map((run) => run.residual ?? 0), dots: true}; }), "CPU time [s]", "certificate [-]");
-  chart("convergence", data.histories.filter((one) => one[0] === p).map((one) => ({name: data.methods[one[1]], x: one[3], y: one[2]})), "time [s]", "certificate [-]");
+  chart(get("speed"), named.map((method) => { const same = own.filter((run) => run.method === method); return {...look(method), x: same.map((run) => run.cpu), y: same.map((run) => run.residual ?? 0), dots: (i) => ({words: `${method}: ${short(same[i].residual)} after ${short(same[i].cpu)} s`})}; }), "CPU time [s]", "certificate [-]", LOGS);
+  chart(get("convergence"), data.histories.filter((one) => one[0] === p).map((one) => ({...look(data.methods[one[1]]), x: one[3], y: one[2]})), "time [s]", "certificate [-]", LOGS);
   table("of-problem", [["method", "method", "solver"], ["asked", "tolerance"], ["certificate", "residual"], ["claimed", "claimed"], ["status", "status"], ["CPU [s]", "cpu"], ["lower quartile", "low"], ["upper quartile", "high"], ["wall [s]", "wall"], ["memory [MB]", "memory"], ["repeats", "repeats"]], own);
 }
 

@@ -10,7 +10,8 @@ const CONTACT = data.words ?? {  // those of a scene that nobody has solved yet,
 };
 const STATUS = ["open", "stick", "slip"];
 const now = {field: data.words ? "body" : "von_mises", scale: data.scale, contact: Object.keys(CONTACT)[0], state: data.states - 1, arrows: true, clear: false, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, box: data.near, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38};
-const view = document.getElementById("view"), config = {responsive: true, displaylogo: false};
+const view = document.getElementById("view");
+let charted = false;
 const control = (name) => document.getElementById(name);
 
 function label(name) {
@@ -132,12 +133,6 @@ function cut(item, whole, length) {  // what lies on one side of a plane, closed
     return left;
   };
   return {xyz, values: found, cells, from: [...from, ...origins], lines: drawn};
-}
-
-function span(arrays) {
-  let low = Infinity, high = -Infinity;
-  for (const array of arrays) for (const value of array) { if (value < low) low = value; if (value > high) high = value; }
-  return low < high ? [low, high] : [low - 0.5, high + 0.5];
 }
 
 const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette((data.roles || [0]).map((_, i) => ["999999", "0072B2", "009E73", "CC79A7", "D55E00", "E69F00", "56B4E9", "F0E442"][i % 8]), true)};
@@ -341,31 +336,34 @@ function requestDraw() {
   requestAnimationFrame(() => { asked = false; draw(); });
 }
 
+function sections(pair, c) {  // lines across the triangles of a surface in space, along coordinate c of the surface through the largest pressure
+  const length = count(pair), pressure = state(pair, "pressure"), [x, y] = [c, 1 - c].map((own) => pair.place.subarray(own * length, (own + 1) * length)), peak = pressure.reduce((best, value, i) => (value > pressure[best] ? i : best), 0), made = {x: [], y: []};
+  const [low, high] = span([y]), level = y[peak] + 1e-6 * ((low + high) / 2 - y[peak] || high - low);  // beside the nodes, inside the surface
+  for (let t = 0; t < pair.cells.length; t += 3) for (let k = 0; k < 3; k++) {
+    const a = pair.cells[t + k], b = pair.cells[t + ((k + 1) % 3)];
+    if (y[a] > level === y[b] > level) continue;
+    const share = (level - y[a]) / (y[b] - y[a]);
+    made.x.push(x[a] + share * (x[b] - x[a])); made.y.push(pressure[a] + share * (pressure[b] - pressure[a]));
+  }
+  return {...made, pairs: true};
+}
+
 function drawContact() {
-  const chart = control("contact-chart"), pair = contacts[Number(control("pair").value) || 0];
+  const box = control("contact-chart"), pair = contacts[Number(control("pair").value) || 0];
   if (!pair) return;
-  const status = state(pair, "status"), pressure = state(pair, "pressure"), common = {margin: {l: 60, r: 15, t: 30, b: 95}, legend: {orientation: "h", y: -0.25, yanchor: "top"}, uirevision: "kept"};
-  const words = [...status].map((value) => STATUS[value]);
   if (!flat) {
-    const [name, unit] = CONTACT[now.contact], x = pair.place.subarray(0, count(pair)), y = pair.place.subarray(count(pair));
-    const trace = {
-      type: "scatter", mode: "markers", x, y, text: words, meta: {contact: contacts.indexOf(pair)},
-      marker: {color: state(pair, now.contact), colorscale: now.contact === "status" ? [[0, COLOURS.grey], [0.5, COLOURS.blue], [1, COLOURS.orange]] : "Cividis", showscale: now.contact !== "status", size: 7, symbol: "square"},
-      hovertemplate: `x %{x:.4g}, y %{y:.4g} ${plain(LENGTH)}<br>${name} %{marker.color:.4g} ${plain(unit)}<br>%{text}<extra></extra>`,
-    };
-    Plotly.react(chart, [trace], {...common, xaxis: {title: {text: plain(`x on the surface [${LENGTH}]`)}, constrain: "domain"}, yaxis: {title: {text: plain(`y on the surface [${LENGTH}]`)}, scaleanchor: "x", constrain: "domain"}}, config);
+    chart(box, [0, 1].map((c) => ({...sections(pair, c), name: `along ${"xy"[c]}`, ink: [COLOURS.green, COLOURS.orange][c]})), `place on the surface, 0 at its middle [${LENGTH}]`, `pressure on lines through its largest value [${STRESS}]`);
     return;
   }
-  const bound = state(pair, "bound"), traction = state(pair, "along"), order = [...pair.place.keys()].sort((a, b) => pair.place[a] - pair.place[b]);
-  const pick = (values) => order.map((i) => values[i]), x = pick(pair.place), meta = {contact: contacts.indexOf(pair), order};
-  const series = (name, y, look) => ({type: "scatter", name, x, y, text: pick(words), meta, hovertemplate: `%{x:.4g} ${plain(LENGTH)}: %{y:.4g} ${plain(STRESS)}, %{text}`, ...look});
-  Plotly.react(chart, [
-    series("pressure", pick(pressure), {mode: "lines+markers", line: {color: COLOURS.green}, marker: {size: 5}}),
-    series("friction bound", pick(bound), {mode: "lines", line: {color: COLOURS.grey, dash: "dash"}}),
-    series("minus friction bound", pick(bound).map((v) => -v), {mode: "lines", line: {color: COLOURS.grey, dash: "dash"}, showlegend: false}),
-    series("tangential traction", pick(traction), {mode: "lines+markers", line: {color: COLOURS.blue},
-      marker: {size: 7, symbol: pick(status).map((s) => ["x", "circle", "square-open"][s]), color: pick(status).map((s) => [COLOURS.grey, COLOURS.blue, COLOURS.orange][s])}}),
-  ], {...common, xaxis: {title: {text: plain(`place on the surface [${LENGTH}]`)}}, yaxis: {title: {text: plain(`[${STRESS}]`)}}}, config);
+  const order = [...pair.place.keys()].sort((a, b) => pair.place[a] - pair.place[b]), sorted = (values) => order.map((i) => values[i]), x = sorted(pair.place);
+  const status = sorted(state(pair, "status")), bound = sorted(state(pair, "bound")), choose = (i) => { probe({contact: contacts.indexOf(pair), node: order[i]}); draw(); };
+  const series = (name, y, ink, fills) => ({name, x, y, ink, pick: choose, dots: fills && ((i) => ({words: `${number(x[i])} ${LENGTH}: ${number(y[i])} ${STRESS}, ${STATUS[status[i]]}`, ...fills[status[i]]}))});
+  chart(box, [
+    series("pressure", sorted(state(pair, "pressure")), COLOURS.green, [{r: 2}, {r: 2}, {r: 2}]),
+    {...series("friction bound", bound, COLOURS.grey), dash: true},
+    {...series("", bound.map((value) => -value), COLOURS.grey), dash: true},
+    series("tangential traction (full: stick, hollow: slip)", sorted(state(pair, "along")), COLOURS.blue, [{r: 1.5}, {r: 3}, {r: 3, fill: "#fff", stroke: COLOURS.orange}]),
+  ], `place on the surface [${LENGTH}]`, `traction [${STRESS}]`);
 }
 
 function columnLabel(name) {
@@ -376,11 +374,11 @@ function columnLabel(name) {
 function drawPath() {
   if (!data.history) return;
   const h = data.history, i = now.state, [a, b] = [control("across").value, control("upward").value], steps = h[b].map((_, k) => k + 1), x = a === "state" ? steps : h[a];
-  Plotly.react(control("path-chart"), [
-    {type: "scatter", mode: "lines+markers", name: "states", x, y: h[b], line: {color: COLOURS.blue}, hovertemplate: "state %{pointNumber}<br>%{x:.4g}, %{y:.4g}<extra></extra>"},
-    {type: "scatter", mode: "markers", name: "this state", x: [x[i]], y: [h[b][i]], marker: {size: 13, color: COLOURS.orange}, hoverinfo: "skip"},
-  ], {margin: {l: 60, r: 15, t: 30, b: 50}, showlegend: false,
-    xaxis: {title: {text: plain(columnLabel(a))}}, yaxis: {title: {text: plain(columnLabel(b))}}}, config);
+  const choose = (k) => { control("state").value = k; control("state").dispatchEvent(new Event("input")); };
+  chart(control("path-chart"), [
+    {name: "", x: [x[i]], y: [h[b][i]], ink: COLOURS.orange, dots: () => ({r: 6, words: `state ${i + 1}`})},
+    {name: "", x, y: h[b], ink: COLOURS.blue, pick: choose, dots: (k) => ({words: `state ${k + 1}: ${number(x[k])}, ${number(h[b][k])}`})},
+  ], columnLabel(a), columnLabel(b));
 }
 
 function stateWords() {
@@ -389,7 +387,7 @@ function stateWords() {
   control("state-words").textContent = `state ${i + 1} of ${data.states}` + (facts ? `: ${facts}` : "");
 }
 
-function everything() { draw(); if (window.Plotly) { drawContact(); drawPath(); } }
+function everything() { draw(); if (charted) { drawContact(); drawPath(); } }
 
 function choices(id, items, chosen, change) {
   const box = control(id);
@@ -463,11 +461,7 @@ new ResizeObserver(() => { if (!painter.fits()) requestDraw(); }).observe(view);
 for (const id of ["charts", "scale-control", "most"]) control(id).hidden = Boolean(data.words);
 if (data.words) return;
 await new Promise((then) => requestAnimationFrame(() => setTimeout(then)));  // the picture is on the screen before the charts are made
-await plotly();
+charted = true;
 drawContact();
 drawPath();
-control("contact-chart").on("plotly_click", ({points: [point]}) => {
-  const {contact, order} = point.data.meta;
-  probe({contact, node: order ? order[point.pointNumber] : point.pointNumber});
-  draw();
-});
+performance.mark("charted");

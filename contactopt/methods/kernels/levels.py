@@ -132,7 +132,7 @@ class Level:
             moves = np.any(D != 0, axis=(1, 2))
             closed, D = busy[moves], D[moves]
         balance = np.einsum("ckp,ck->p", self.V, r) + self.s
-        return Evaluation(error, balance, closed, D)
+        return Evaluation((r, lam), error, balance, closed, D)
 
     @cached_property
     def inverse(self) -> Symbols:
@@ -199,6 +199,7 @@ class Level:
 class Evaluation:
     """Errors at a point: error (c, k), balance (p,), m contacts with a derivative D (m, c, c)."""
 
+    point: Point
     error: np.ndarray
     balance: np.ndarray
     closed: np.ndarray
