@@ -15,7 +15,7 @@ import numpy as np
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.cards import force_unit
-from contactopt.figures.html import filled, packed, write_html
+from contactopt.figures.html import filled, packed, remark_list, write_html
 from contactopt.figures.page_data import MOST_INSIDE, body_arrays, box_of, whole_box
 from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
 from contactopt.figures.scene_check import SceneCheck
@@ -94,7 +94,6 @@ def _write(
         "ring": scene.analysis.revolved,
         "mirrors": planes,
         "box": box.tolist(),
-        "near": box.tolist(),
         "contact": [(near[0] - wide).tolist(), (near[1] + wide).tolist()],
         "scale": 1.0,
         "most_scale": 1.0,
@@ -110,8 +109,8 @@ def _write(
     body = filled(
         "view.html",
         scene=html.escape(scene.name),
-        certificate=words[0],
-        remarks="".join(f"<p><strong>{html.escape(note)}</strong></p>" for note in words[2]),
+        certificate=f"<p>{words[0]}</p>",
+        remarks=remark_list(words[2]),
         move="move" if scene.dim == 2 else "turn",
         followers="",
         arrows="loads, and normals from the lower to the upper body,",
@@ -126,11 +125,13 @@ def _bodies(scene: Scene, meshes: Mapping[str, Any], planes: list[Any]) -> list[
     """The bodies with meshes, each coloured by its number."""
     inside = scene.dim == 3 and sum(mesh.p.shape[1] for mesh in meshes.values()) <= MOST_INSIDE
     made = []
-    for number, (name, mesh) in enumerate(meshes.items()):
+    for name, mesh in meshes.items():
         kind, elements = elements_of(mesh)
         block = SimpleNamespace(type=kind, data=elements, dim=scene.dim)
         count = mesh.doflocs.shape[1]
-        values = {"move": np.zeros((1, count, scene.dim)), "body": np.full((1, count), number)}
+        values = {
+            "move": np.zeros((1, count, scene.dim)),
+        }
         drawn = SimpleNamespace(cells=[block], points=_spatial(mesh.doflocs))
         made.append({"name": name} | body_arrays(drawn, values, planes, inside))
     return made

@@ -32,6 +32,8 @@ from contactopt.linear.operators import (
     asymmetry,
     dense,
     diagonal,
+    form,
+    has_entries,
     row_sizes,
     sparse,
 )
@@ -163,9 +165,8 @@ class InterfaceProblem:
 
     @property
     def _form(self) -> str:
-        form = "sparse" if sp.issparse(self.Q) else "array"
-        form = "by products" if isinstance(self.Q, InterfaceOperator) else form
-        return f"Q {form} of {self.q.size} x {self.q.size}"
+        kind = form(self.Q) if has_entries(self.Q) else "by products"
+        return f"Q {kind} of {self.q.size} x {self.q.size}"
 
     @property
     def contacts(self) -> int:
@@ -189,7 +190,7 @@ class InterfaceProblem:
     def fingerprint(self) -> str:
         """Digest of the problem's data, for caching and for naming it in tables."""
         digest = hashlib.sha256(self.law.digest)
-        implicit = isinstance(self.Q, InterfaceOperator)
+        implicit = not has_entries(self.Q)
         if implicit:
             known = [self.Q @ np.random.default_rng(0).normal(size=self.q.size)]
         else:  # the same for an array and for sparse rows
@@ -219,7 +220,7 @@ class InterfaceProblem:
 
     def explicit(self) -> InterfaceProblem:
         """The same problem with Q an array. InputError if that would be too large."""
-        return self if isinstance(self.Q, np.ndarray) else self.altered(Q=dense(self.Q))
+        return self if form(self.Q) == "array" else self.altered(Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """The relative displacements u = Q r + V lambda + q (k, dim) [length], normal first."""

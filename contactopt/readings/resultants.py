@@ -176,7 +176,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     [force], largest pressure [stress], area [length^2], half-widths [length], coupling with its
     reason, and counts of contacts. 'holders': the resultant of each support and plate.
     """
-    pairs = {}
+    pairs, bodies = {}, {pair.name: list(pair.bodies) for pair in reduction.scene.pairs}
     for (view, own), (name, found) in zip(
         views(reduction, solution), pair_resultants(reduction, solution).items()
     ):
@@ -184,6 +184,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
         status, zone = contact_status(problem, r), contact_zone(view.scene, problem, r)
         level = is_level(problem, view.coupling.frames, r)
         pairs[name] = found.table | {
+            "bodies": bodies[name],
             "normal_force": float(r[:, 0].sum()),
             "friction_force": float(lengths(r[:, 1:]).sum()),
             "friction_bound": float(problem.law.bound_along(r).sum()),

@@ -1,21 +1,22 @@
 const data = JSON.parse(await unsqueezed("data"));
 const [LENGTH, STRESS, FORCE] = data.units;
 const flat = data.dim === 2;
-const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value.type ? unpack(value) : value]));
+const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value?.type ? unpack(value) : value]));
 const bodies = data.bodies.map((body) => ({...opened(body), values: opened(body.values), shown: true, corners: body.inside.shape[1]}));
 const contacts = data.contacts.map((pair) => ({...opened(pair), states: opened(pair.states), shown: !pair.hidden, corners: 4, inside: [], cut_cells: []}));
+bodies.forEach((body, index) => { body.values.body ??= new Float32Array(body.points.length / 3).fill(index); });
 const CONTACT = data.words ?? {  // those of a scene that nobody has solved yet, or of a result
   pressure: ["pressure", STRESS], traction: ["size of the tangential traction", STRESS], status: ["stick, slip, open", ""],
   gap: ["gap", LENGTH], slip: ["size of the slip", LENGTH],
 };
 const STATUS = ["open", "stick", "slip"];
-const now = {field: data.words ? "body" : "von_mises", scale: data.scale, contact: Object.keys(CONTACT)[0], state: data.states - 1, arrows: true, clear: false, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, box: data.near, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38};
+const now = {field: "body", scale: data.scale, contact: Object.keys(CONTACT)[0], state: data.states - 1, arrows: flat || Boolean(data.words), clear: true, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, focus: 0};
 const view = document.getElementById("view");
 let charted = false;
 const control = (name) => document.getElementById(name);
 
 function label(name) {
-  if (name === "body") return name;
+  if (name === "body") return "bodies";
   if (name === "von_mises") return `von Mises stress [${STRESS}]`;
   if (name.startsWith("stress_")) return `stress ${name.slice(7)} [${STRESS}]`;
   return (name === "size" ? "size of the displacement" : `displacement ${name.slice(5)}`) + ` [${LENGTH}]`;
@@ -28,7 +29,7 @@ function at(values, length) {  // those of the state shown, of all that there ar
 }
 
 const state = (pair, name) => at(pair.states[name], count(pair) * (name === "vector" ? 3 : 1));
-const bodyNames = data.words ? ["body"] : bodies.length ? ["von_mises", "size", ...data.axes.map((axis) => `move_${axis}`), ...Object.keys(bodies[0].values).filter((name) => name.startsWith("stress_"))] : [];
+const bodyNames = data.words ? ["body"] : bodies.length ? ["body", "von_mises", "size", ...data.axes.map((axis) => `move_${axis}`), ...Object.keys(bodies[0].values).filter((name) => name.startsWith("stress_"))] : [];
 
 function values(body, name, every = false) {  // at the nodes of a body, in the state shown or in every state
   if (body.values[name]) return every ? body.values[name] : at(body.values[name], count(body));
@@ -47,11 +48,11 @@ function sign(name, image) {  // by which a component changes in an image; those
 }
 
 function placed(item) {  // places of the nodes of all images shown, one image after the other
-  const length = count(item), dim = data.dim, move = at(item.move, dim * length), all = shownImages(), xyz = [0, 1, 2].map(() => new Float32Array(length * all.length));
+  const length = count(item), dim = data.dim, move = at(item.move, dim * length), more = Math.max(0, now.scale - 1), all = shownImages(), xyz = [0, 1, 2].map(() => new Float32Array(length * all.length));
   all.forEach((image, k) => {
     for (let c = 0; c < 3; c++) {
       const plane = image.find(([axis]) => axis === c), turn = plane ? -1 : 1, shift = plane ? 2 * plane[1] : 0;
-      for (let i = 0; i < length; i++) xyz[c][k * length + i] = shift + turn * (item.points[3 * i + c] + (c < dim ? now.scale * move[dim * i + c] : 0));
+      for (let i = 0; i < length; i++) xyz[c][k * length + i] = shift + turn * (item.points[3 * i + c] + (c < dim ? now.scale * move[dim * i + c] + (item.lift ? more * item.lift[dim * i + c] : 0) : 0));
     }
   });
   return xyz;
@@ -135,14 +136,14 @@ function cut(item, whole, length) {  // what lies on one side of a plane, closed
   return {xyz, values: found, cells, from: [...from, ...origins], lines: drawn};
 }
 
-const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette((data.roles || [0]).map((_, i) => ["999999", "0072B2", "009E73", "CC79A7", "D55E00", "E69F00", "56B4E9", "F0E442"][i % 8]), true)};
+const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.heat), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette((data.roles || [0]).map((_, i) => ["999999", "0072B2", "009E73", "CC79A7", "D55E00", "E69F00", "56B4E9", "F0E442"][i % 8]), true)};
 const ROUNDING = 1e-12;  // of the size of the bodies, below which a gap or a slip is what rounding leaves of zero
 const BIN = 16;  // pixels, the side of a square of the picture that shows at most one arrow
 const painter = new Painter(view);
 let owners = [];  // [first number, item, node behind the corners of its triangles or its dots]
 
 function bodyColours() {
-  if (data.words) return {table: TABLES.body, low: -0.5, high: bodies.length - 0.5, names: bodies.map((body) => body.name)};
+  if (now.field === "body") return {table: TABLES.body, low: -0.5, high: bodies.length - 0.5, names: bodies.map((body) => body.name)};
   const shown = bodies.filter((body) => body.shown), [low, high] = shown.length ? span(shown.map((body) => values(body, now.field, true))) : [0, 1], mises = now.field === "von_mises";
   return {table: TABLES.bodies, low: mises ? 0 : low, high: mises ? Math.min(high, data.top) : high};
 }
@@ -151,7 +152,7 @@ function contactColours() {
   if (now.contact === "role") return {table: TABLES.role, low: -0.5, high: data.roles.length - 0.5, names: data.roles};
   if (now.contact === "status") return {table: TABLES.status, low: -0.5, high: 2.5, names: STATUS};
   const [low, high] = span(contacts.filter((pair) => pair.shown).map((pair) => pair.states[now.contact]));
-  return {table: TABLES.contact, low, high};
+  return {table: TABLES.contact, low: now.contact === "gap" ? low : Math.min(low, 0), high};
 }
 
 function own(item, meta, cells) {  // numbers for the triangles of an item, or for its dots
@@ -160,16 +161,26 @@ function own(item, meta, cells) {  // numbers for the triangles of an item, or f
   return first;
 }
 
+function hides(body) {  // whether it may stand between the eye and the contact looked at: all but the body behind that
+  if (flat || !now.clear || now.cut !== "") return false;
+  const {normal, bodies: names} = contacts[now.focus] ?? {}, eye = painter.axes[2];
+  return !normal || body.name !== names[normal.reduce((sum, value, c) => sum + value * eye[c], 0) > 0 ? 1 : 0];
+}
+
 function paintBody(body, colours) {
   const shape = shaped(body, [values(body, now.field), now.field]), drawn = [["lines", 90, 1], ["edges", 20, 1.6]].filter(([name]) => now[name]).map(([name, ...look]) => [shape.lines(name === "edges" ? whole(body, name) : body[name]), ...look]);
   const places = painter.places(shape.xyz), first = own(body, {body: bodies.indexOf(body), from: shape.from, places}, shape.cells);
-  painter.triangles(places, shape.cells, shape.values, {...colours, lit: !flat, sheer: now.clear, first});
+  painter.triangles(places, shape.cells, shape.values, {...colours, lit: !flat, sheer: hides(body), first});
   for (const [pairs, ...look] of drawn) painter.lines(places, pairs, ...look);
 }
 
 function paintContact(pair, colours) {
   const shape = shaped(pair, [state(pair, now.contact)]), places = painter.places(shape.xyz), meta = {contact: contacts.indexOf(pair), from: shape.from, places};
-  if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, lit: false, towards: 1, first: own(pair, meta, shape.cells)});
+  if (pair.lines?.length) {
+    const {places: corners, cells, from} = painter.ribbon(places, shape.lines(pair.lines), 8);
+    painter.lines(places, shape.lines(pair.lines), 20, 10, 5);
+    painter.triangles(corners, cells, from.map((node) => shape.values[node]), {...colours, lit: false, towards: 7, first: own(pair, {...meta, places: corners, from}, cells)});
+  } else if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, lit: false, towards: painter.dense, first: own(pair, meta, shape.cells)});
   else painter.dots(places, shape.values, 3, {...colours, first: own(pair, meta)});
 }
 
@@ -226,17 +237,18 @@ function rulers() {  // coordinates of the mesh: along the rim of a plane pictur
   }
 }
 
-function draw() {
+function draw(moving = false) {
   const body = bodyColours(), contact = contactColours(), pairs = contacts.filter((pair) => pair.shown);
   owners = [];
-  painter.begin(); aim();
+  painter.begin(moving); aim();
   for (const item of bodies) if (item.shown) paintBody(item, body);
   for (const pair of pairs) paintContact(pair, contact);
   painter.end(room());
   rulers();
   if (now.arrows) pairs.forEach(arrows);
   const [name, unit] = CONTACT[now.contact];
-  if (pairs.length) painter.bar((data.words ? name : `contact: ${name}`) + (unit ? ` [${unit}]` : ""), contact, 20);
+  for (const [id, on] of [["mesh", now.lines], ["forces", now.arrows], ["slice", now.cut !== ""]]) control(id).setAttribute("aria-pressed", on);
+  if (pairs.length) painter.bar((data.words || contacts.length > 1 ? name : `${name} between the bodies`) + (unit ? ` [${unit}]` : ""), contact, 20);
   if (bodies.length) {
     painter.bar(label(now.field) + (data.moving && now.field.startsWith("stress_") ? ", last state" : ""), body, view.clientHeight - 32);
     if (!data.words) painter.text(now.scale === 1 ? "displacements to scale" : `displacements drawn x ${number(now.scale)}`, view.clientWidth - 8, room()[2] - 8, "right");
@@ -284,10 +296,23 @@ function turn(about, up, closer) {
   draw();
 }
 
-function show(box) {
-  Object.assign(now, {box, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38});
+function show(box, look = {}) {
+  Object.assign(now, {box, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38, ...look});
+  for (const name of ["field", "clear", "arrows", "lines", "cut"]) { const own = control(name); if (own.type === "checkbox") own.checked = now[name]; else own.value = now[name]; }
+  cutWords();
   draw();
 }
+
+function face(index) {  // the contact of a pair, the eye beside its normal and above
+  const {box, normal} = contacts[index], plain = {field: "body", clear: true, cut: ""};
+  now.focus = index;
+  if (!normal || flat) return show(box ?? data.contact, plain);
+  const [x, y, z] = normal.map((value) => (normal[2] < -0.01 ? -value : value));
+  show(box, {...plain, ...(z > 0.8 ? {height: 0.85} : {angle: Math.atan2(y, x) + 0.55, height: Math.min(1.2, Math.asin(Math.min(1, z)) + 0.35)})});
+}
+
+const first = contacts.reduce((best, pair, i) => (pair.peak > (contacts[best].peak ?? 0) ? i : best), 0);
+const reset = () => (data.words ? show(data.box) : face(first));
 
 function pick(x, y) {  // the node at a place of the picture [pixels of the page]
   const column = Math.floor(x * painter.dense), row = Math.floor(y * painter.dense), reach = Math.ceil(4 * painter.dense);
@@ -329,11 +354,13 @@ function listen() {  // to mouse, pen and fingers
   }, {passive: false});
 }
 
-let asked = false;
-function requestDraw() {
+let asked = false, rest = 0;
+function requestDraw() {  // at once as it moves, and in full when it rests
+  clearTimeout(rest);
+  rest = setTimeout(draw, 150);
   if (asked) return;
   asked = true;
-  requestAnimationFrame(() => { asked = false; draw(); });
+  requestAnimationFrame(() => { asked = false; draw(true); });
 }
 
 function sections(pair, c) {  // lines across the triangles of a surface in space, along coordinate c of the surface through the largest pressure
@@ -345,7 +372,8 @@ function sections(pair, c) {  // lines across the triangles of a surface in spac
     const share = (level - y[a]) / (y[b] - y[a]);
     made.x.push(x[a] + share * (x[b] - x[a])); made.y.push(pressure[a] + share * (pressure[b] - pressure[a]));
   }
-  return {...made, pairs: true};
+  const touches = (_, i) => Math.max(made.y[i - (i % 2)], made.y[i - (i % 2) + 1]) > 1e-3 * pressure[peak];  // either end of a line
+  return {x: made.x.filter(touches), y: made.y.filter(touches), pairs: true};
 }
 
 function drawContact() {
@@ -419,12 +447,12 @@ const knife = control("cut-place"), cutWords = () => {
 };
 choices("cut", [["", "nothing"], ...data.axes.map((name, axis) => [axis, name])], "", (value) => { now.cut = value; cutWords(); });
 knife.value = now.place;
-knife.addEventListener("input", () => { now.place = Number(knife.value); cutWords(); draw(); });
+knife.addEventListener("input", () => { now.place = Number(knife.value); cutWords(); requestDraw(); });
 cutWords();
 const slider = control("scale");
 slider.max = data.most_scale; slider.step = data.most_scale / 100; slider.value = data.scale;
 const times = () => { control("scale-words").textContent = `displacements x ${number(now.scale)}`; };
-slider.addEventListener("input", () => { now.scale = Number(slider.value); times(); draw(); });
+slider.addEventListener("input", () => { now.scale = Number(slider.value); times(); requestDraw(); });
 times();
 if (data.history) {
   const columns = Object.keys(data.history), h = data.history, moves = (name) => h[name] && Math.max(...h[name]) - Math.min(...h[name]) > 1e-6 * (Math.max(...(h.approach || [1])) - Math.min(...(h.approach || [0])));
@@ -432,13 +460,23 @@ if (data.history) {
   for (const [id, chosen] of [["across", across], ["upward", upward]]) choices(id, [...(id === "across" ? [["state", "state"]] : []), ...columns.map((name) => [name, columnLabel(name)])], chosen, () => {});
   const steps = control("state");
   steps.max = data.states - 1; steps.value = now.state;
-  steps.addEventListener("input", () => { now.state = Number(steps.value); stateWords(); everything(); if (now.probe) probe(now.probe); });
-} else control("path").hidden = true;
+  steps.addEventListener("input", () => { now.state = Number(steps.value); stateWords(); requestDraw(); if (charted) { drawContact(); drawPath(); } if (now.probe) probe(now.probe); });
+} else control("path").hidden = control("states").hidden = true;
 if (!bodies.length) control("body-controls").hidden = true;
 for (const [id, ...move] of [["left", -1, 0, 1], ["right", 1, 0, 1], ["up", 0, 1, 1], ["down", 0, -1, 1], ["closer", 0, 0, 0.8], ["farther", 0, 0, 1.25]])
   control(id).addEventListener("click", () => turn(...move));
-control("home").addEventListener("click", () => show(data.box));
-control("near").addEventListener("click", () => show(data.contact));
+const flip = (name) => { control(name).checked = now[name] = !now[name]; draw(); }, places = contacts.flatMap((pair, i) => (pair.box ? [i] : []));
+const PRESSED = {
+  near: ["c", () => (data.words ? show(data.contact) : face(now.focus))], next: ["n", () => face(places[(places.indexOf(now.focus) + 1) % places.length])],
+  home: ["b", () => show(data.box, data.words ? {} : {field: "von_mises", clear: false})], mesh: ["w", () => flip("lines")], forces: ["f", () => flip("arrows")],
+  slice: ["x", () => { const ways = ["", ...data.axes.keys()].map(String), own = control("cut"); own.value = ways[(ways.indexOf(String(now.cut)) + 1) % ways.length]; own.dispatchEvent(new Event("change")); }], reset: ["r", reset],
+};
+for (const [id, [key, act]] of Object.entries(PRESSED)) {
+  control(id).addEventListener("click", act);
+  document.addEventListener("keydown", (event) => { if (event.key === key && !event.ctrlKey && !event.metaKey && !/INPUT|SELECT/.test(event.target.tagName)) act(); });
+}
+control("next").hidden = flat || places.length < 2;
+control("slice").hidden = flat || !bodies.length;
 const KEYS = {ArrowLeft: [-1, 0, 1], ArrowRight: [1, 0, 1], ArrowUp: [0, 1, 1], ArrowDown: [0, -1, 1], "+": [0, 0, 0.8], "=": [0, 0, 0.8], "-": [0, 0, 1.25]};
 view.addEventListener("keydown", (event) => { if (KEYS[event.key]) { turn(...KEYS[event.key]); event.preventDefault(); } });
 control("largest").addEventListener("click", () => {
@@ -454,8 +492,9 @@ control("peak").addEventListener("click", () => {
   draw();
 });
 listen();
+control("pair-control").hidden = contacts.length < 2;
 stateWords();
-show(now.box);
+reset();
 performance.mark("drawn");
 new ResizeObserver(() => { if (!painter.fits()) requestDraw(); }).observe(view);  // it also calls at once
 for (const id of ["charts", "scale-control", "most"]) control(id).hidden = Boolean(data.words);
