@@ -75,7 +75,7 @@ class Law:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters."""
-        return _names_of(type(self))
+        return _names_of(type(self))  # type: ignore[arg-type]
 
     @property
     def contacts(self) -> int:
