@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from contactopt.derivatives.gradient import gradient
     from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
+    from contactopt.holding import Limit, limit
     from contactopt.material import Material
     from contactopt.meshes.mesh_files import load_mesh
+    from contactopt.methods.batch import solve_batch
     from contactopt.methods.diagnosis import Diagnosis, diagnose
     from contactopt.methods.driver import solve
     from contactopt.methods.enumeration import all_solutions
@@ -61,8 +63,10 @@ _HOMES = {
     "derivatives.gradient": "gradient",
     "derivatives.interface": "sensitivity",
     "errors": "BackendError InputError",
+    "holding": "Limit limit",
     "material": "Material",
     "meshes.mesh_files": "load_mesh",
+    "methods.batch": "solve_batch",
     "methods.diagnosis": "Diagnosis diagnose",
     "methods.driver": "solve",
     "methods.enumeration": "all_solutions",

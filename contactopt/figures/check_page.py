@@ -22,7 +22,7 @@ from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
-from contactopt.scenes.scene import BodyForce, Part, Plate, Scene, Traction
+from contactopt.scenes.scene import Part, Scene
 
 ROLES = ("no use", "support", "load", "plate", "contact")
 NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundary that stay legible
@@ -204,19 +204,20 @@ def _boundaries(
     boundary in a plane of symmetry, across which the body is shown whole, is hidden.
     """
     held = {support.boundary: support.displacement for support in part.supports}
-    middle = _spatial(mesh.p.mean(axis=1, keepdims=True))[0]
-    loads = {load.boundary: load for load in part.loads if not isinstance(load, BodyForce)}
+    centre = _spatial(mesh.p.mean(axis=1, keepdims=True))[0]
+    loads = {load.boundary: load for load in part.loads}
     for name, item in _sides(mesh):
         load = loads.get(name)
-        role = 3 if isinstance(load, Plate) else 2 if load else 1 if name in held else 0
+        role = (3 if load.level else 2) if load else 1 if name in held else 0
         if role == 0 and name in scene.surfaces_of(part):
             continue  # the pairs show it
         places, vector = item["places"], item["vector"]
-        if isinstance(load, Traction):
-            vector[:, : scene.dim] = load.value
-        elif isinstance(load, Plate):
-            nearest = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
-            vector[nearest, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
+        if load:
+            told = load.values(scene.components)
+            middle = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
+            vector[middle if load.level else slice(None), : scene.dim] = [
+                told.get(c, 0.0) for c in scene.components
+            ]
         size = float(np.ptp(mesh.p, axis=1).max())
         if any(np.ptp(places[:, a]) <= 1e-9 * size >= abs(places[0, a] - x) for a, x in planes):
             item["hidden"] = True
@@ -226,17 +227,18 @@ def _boundaries(
                 axes = 2.0 * (
                     np.arange(scene.dim) == np.argmin(np.ptp(places, axis=0)[: scene.dim])
                 )
-            outward = np.where(places.mean(axis=0) > middle + 1e-6 * size, 1.0, -1.0)
+            outward = np.where(places.mean(axis=0) > centre + 1e-6 * size, 1.0, -1.0)
             item["held"] = np.tile(outward * np.pad(axes, (0, 3 - scene.dim)), (len(places), 1))
         yield item | {"name": f"{part.name}: {name} ({ROLES[role]})", "role": role}
-    for force in part.loads:
-        if isinstance(force, BodyForce):
+    for load in part.loads:
+        if not load.boundary:
+            force = np.array(list(load.values(scene.components).values()))
             yield {
-                "name": f"{part.name}: force per volume",
+                "name": f"{part.name}: {load.what}",
                 "places": _spatial(mesh.p.mean(axis=1, keepdims=True)),
                 "cells": np.zeros((0, 3), dtype=int),
                 "role": 2,
-                "vector": np.pad(np.array([force.value]), ((0, 0), (0, 3 - scene.dim))),
+                "vector": _spatial(force[:, None]),
             }
 
 

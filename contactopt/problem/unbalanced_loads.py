@@ -235,7 +235,7 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
     if motion.startswith("rotation"):
         return (
             f"the load is more than the contacts can hold: {body} tips over ({motion}); change the"
-            " load or add a support."
+            " load or add a support; contactopt limit finds the load that they hold."
         )
     if found.opens:
         return (
@@ -244,7 +244,8 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
         )
     return (
         f"the load is more than the contacts can hold: {body} slides off ({motion}); press the"
-        " bodies together, or add friction or a support."
+        " bodies together, or add friction or a support; contactopt limit finds the load that they"
+        " hold."
     )
 
 
