@@ -125,6 +125,8 @@ def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
         (["punch-2d", "--set", "width=1e-5"], "lost in rounding"),
         (["pin-in-bush", "--force", "1e150"], "too large"),
         (["pin-in-bush", "--force", "1e-200"], "too small"),
+        (["punch-2d", "--force", "1e-320"], "too small: write 0, or take units"),
+        (["hertz-half-space", "--force", "1e-300"], "too small: write 0, or take units"),
         (["punch-2d", "--out", "x" * 300], "File name too long"),
         (["x" * 300 + ".toml"], "does not exist"),
     ],

@@ -240,6 +240,32 @@ def test_a_tower_stands_up_to_its_limit(side, holds):
     assert (escape(problem) is None) == holds
 
 
+@pytest.mark.parametrize("law", ["tied", "bilateral", "coulomb"])
+@pytest.mark.parametrize("cells", [3, 4])
+def test_a_scene_that_nothing_holds_is_solved_or_told_so(law, cells):
+    """Two blocks on each other without supports: in balance, in uniaxial compression, they are
+    solved, and a remark names the motions that are left; pulled, they are refused.
+    """
+
+    def told(pull, side=0.0):
+        loads = (Traction("top", (side, -1.0)),), (Traction("bottom", (0.0, 1.0 - pull)),)
+        upper = Part(
+            "upper", block([0.0, 0.0], [1.0, 1.0], [cells] * 2), SOFT, (), loads[0], "bottom"
+        )
+        lower = Part("lower", block([0.0, -1.0], [1.0, 0.0], [3, 3]), SOFT, (), loads[1], "top")
+        pair = Contact("upper", "lower", mu=0.3 * (law != "tied"), law=law)
+        return solve(reduce_bodies(Scene("loose", bodies=(upper, lower), contacts=(pair,))).problem)
+
+    found = told(0.0)
+    assert found.solved and found.reactions[:, 0].sum() == pytest.approx(1.0)
+    (note,) = found.notes
+    assert note.startswith("neither supports nor contacts resist a motion of body '")
+    assert note.count("translation") == 2 and note.count("rotation") == 1
+    for pull, side, motion in ((0.1, 0.0, "translation along y"), (0.0, 0.1, "")):
+        with pytest.raises(InputError, match=rf"neither supports nor contacts hold .*{motion}"):
+            told(pull, side)
+
+
 def test_plates_that_are_pulled_off_are_named():
     scene = scenes.flat_punch(2, elements=6)
     lifted = replace(scene, upper=replace(scene.upper, loads=(Plate("top", {"y": 10.0}),)))

@@ -620,11 +620,12 @@ def test_a_few_contacts_are_solved_by_themselves(monkeypatch):
     wrong = r.copy()
     wrong[1:, k : k + 3] *= -1.0
     before = level.evaluate(wrong, lam)
-    (found, _), after = elimination.eliminated(level, (wrong, lam), before)
+    after = elimination.eliminated(level, before)
+    found = after.point[0]
     assert after.residual < 1e-2 * before.residual
     assert 3 <= np.count_nonzero(np.any(found != wrong, axis=0)) <= len(before.closed) / 2
     np.testing.assert_allclose(found, r, atol=1e-2 * np.abs(r).max())
-    assert elimination.eliminated(level, (r, lam), at)[1].residual <= at.residual
+    assert elimination.eliminated(level, at).residual <= at.residual
 
 
 def test_entries_of_some_contacts_are_those_of_all():

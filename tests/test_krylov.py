@@ -28,7 +28,9 @@ from contactopt.linear.operators import (
     shifted,
 )
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
-from contactopt.methods.kernels.krylov import krylov_step, model_of
+from contactopt.methods.kernels.krylov import Krylov, model_of
+from contactopt.methods.kernels.semismooth import Evaluated, Factored
+from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.methods.kernels.subproblems import KrylovSubproblem
 from contactopt.methods.newton import Newton
 from contactopt.methods.preconditioners import degrees
@@ -160,9 +162,10 @@ def test_a_krylov_step_is_the_dense_step(symmetric):
     D = (D + D.transpose(0, 2, 1)) / 2 if symmetric else D + 0.1 * R
     D[:3], D[3:6] = 0.0, np.eye(d)
     error, balance = random.normal(size=(k, d)), random.normal(size=p)
-    expected = equations.step(error, balance, D, ridge=0.0)
+    at = Evaluated((error, balance), 1.0, error, balance, D)
+    expected = Factored(block_matrix(Q, d))(equations, at, ridge=0.0)
     for name in (None, "none"):
-        got = krylov_step(equations, model_of(problem, name), error, balance, D, 1e-12)
+        got = Krylov(model_of(problem, name))(equations, at, 1e-12)
         for a, b in zip(got, expected):
             assert np.allclose(a, b, atol=1e-8)
 

@@ -23,7 +23,8 @@ from contactopt.benchmark.families.packings import rigid_bodies
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.bonded import Bonded
-from contactopt.methods.kernels.semismooth import Equations
+from contactopt.methods.kernels.semismooth import Equations, Factored, evaluated
+from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
@@ -57,7 +58,8 @@ def test_newton_step_solves_the_linearised_equations(p):
         Q, rng.normal(size=(k, d)), V, rng.normal(size=p), Coulomb(mu).project, rho
     )
     r, lam = rng.normal(size=(k, d)) + np.eye(d)[0], rng.normal(size=p)
-    _, error, balance, D = equations.evaluate(r, lam)
+    at = evaluated(equations, r, lam)
+    error, balance, D = at.error, at.balance, at.D
     # open and closed contacts both occur
     assert {0.0} < {float(np.abs(block).max()) for block in D}
     big, scale = la.block_diag(*D), np.repeat(rho, d)
@@ -72,7 +74,7 @@ def test_newton_step_solves_the_linearised_equations(p):
     )
     expected = np.linalg.solve(full, np.concatenate([error.ravel(), -balance]))
     for dr, dlam in (
-        equations.step(error, balance, D, ridge=0.0),
+        Factored(block_matrix(Q, d))(equations, at, ridge=0.0),
         Bonded(Q, V).step(rho, error, balance, D),
     ):
         assert np.allclose(np.concatenate([dr.ravel(), dlam]), expected, atol=1e-9)

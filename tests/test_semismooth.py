@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from contactopt.methods.kernels.semismooth import Equations, crossover
+from contactopt.methods.kernels.semismooth import Equations, Factored, crossover, evaluated
+from contactopt.methods.kernels.sparse_blocks import block_matrix
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 
 
@@ -54,8 +55,8 @@ def test_it_never_makes_an_answer_worse(seed):
     Q, c, V = A @ A.T + 1e-6 * np.eye(12), rng.normal(size=12), np.zeros((12, 0))
     equations = Equations(Q, c[:, None], V, none, half_line_derivative)
     start = np.maximum(0.0, rng.normal(size=(12, 1)))
-    before, error, balance, D = equations.evaluate(start, none)
-    change = equations.step(error, balance, D)
+    at = evaluated(equations, start, none)
+    before, change = at.residual, Factored(block_matrix(Q, 1))(equations, at)
     assert change is not None and equations.evaluate(start + change[0], none)[0] > 10 * before
     for steps in (2, 3, 5, 20):
         r, lam = crossover(Q, c, V, none, half_line_derivative, start, none, steps)
@@ -69,7 +70,7 @@ def test_a_singular_system_has_no_newton_step():
     """
     V, s, start = np.ones((3, 2)), -np.ones(2), np.ones((3, 1))
     equations = Equations(np.eye(3), np.zeros((3, 1)), V, s, half_line_derivative)
-    _, error, balance, D = equations.evaluate(start, np.zeros(2))
-    assert equations.step(error, balance, D) is None
+    at = evaluated(equations, start, np.zeros(2))
+    assert Factored(block_matrix(equations.Q, 1))(equations, at) is None
     r, lam = crossover(np.eye(3), np.zeros(3), V, s, half_line_derivative, start, np.zeros(2))
     assert np.array_equal(r, start) and np.array_equal(lam, np.zeros(2))

@@ -12,6 +12,7 @@ from conftest import MATERIAL, block
 
 from contactopt import InterfaceProblem, Part, Plate, Rigid, Scene, Solution, Status, Support, run
 from contactopt.problem.laws.tied import Tied
+from contactopt.solving import solve_scene
 from contactopt.solving.follow import follow
 from contactopt.solving.restart import FILE, read_known
 from contactopt.solving.sliding import sliding, sliding_words
@@ -89,6 +90,18 @@ def test_the_states_before_one_that_slides_are_written(make, tmp_path, monkeypat
     np.testing.assert_allclose(
         path["reactions"][-1], again.states[-1].solution.reactions, atol=1e-6 * scale
     )
+
+
+def test_a_state_that_slides_is_given_up_before_the_method_ends(monkeypatch):
+    """What follows the first stages of the default method may take hours."""
+    limit, whole = most(fitted), solve_scene.solve
+
+    def first_stages(problem, max_iterations, **given):
+        return whole(problem, max_iterations=min(max_iterations, 12), **given)
+
+    monkeypatch.setattr(solve_scene, "solve", first_stages)
+    found = follow([fitted(0.0), fitted(1.3 * limit)])
+    assert len(found.states) == 1 and "state 2 of 2 slides" in found.failed.message
 
 
 def test_a_single_state_that_slides_says_so(tmp_path):

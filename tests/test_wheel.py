@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -73,7 +74,7 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     )
     page = "import contactopt as c; c.run('punch-2d', elements=4).view('page.html', show=False)"
     run(binaries / "python", "-c", page, cwd=tmp_path)
-    assert (tmp_path / "page.html").stat().st_size > 100_000, "pages need no extra"
+    assert (tmp_path / "page.html").stat().st_size > 50_000, "pages need no extra"
     code = "import contactopt; print(contactopt.__version__, contactopt.__file__)"
     version, place = run(binaries / "python", "-c", code, cwd=tmp_path).split()
     assert version in wheel.name and str(tmp_path) in place
@@ -83,7 +84,7 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     )
     told = run(sys.executable, "-m", "mypy", "--python-executable", binaries / "python", user,
                cwd=tmp_path)  # fmt: skip
-    assert '"builtins.float"' in told, "users' type checkers see the types"
+    assert re.search(r'"(builtins\.)?float"', told), "users' type checkers see the types"
 
 
 # what each extra is for, tried in an environment that has this extra alone
@@ -136,7 +137,8 @@ from contactopt.cli import main
 assert main(["mesh", "box.step", "--out", "box.msh"]) == 0
 """,
 }
-INTO_DOCS = ("experiments", "reports", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE")
+INTO_DOCS = ("experiments", "reports", "pyproject.toml", "LICENSE")
+INTO_DOCS += ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 
 
 @pytest.mark.slow

@@ -24,9 +24,9 @@ from contactopt.coupling.posed import Posed, posed, problem_of
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.unbalanced_loads import escape, sentence
+from contactopt.problem.unbalanced_loads import escape, loose_names, sentence, sorted_motions
 from contactopt.readings.plausibility import doubts, said_of_meshes
-from contactopt.scenes.scene import Plate, Scene
+from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
 
 CLOSED = 1e-9  # of the size of a surface, within which a gap is what rounding leaves of zero
@@ -140,7 +140,7 @@ def _held(part: Any, name: str, free: InterfaceProblem) -> str:
     """What holds a body."""
     start = f"body '{name}': "
     names = [name.removeprefix(start) for name in free.motions if name.startswith(start)]
-    plates = any(isinstance(load, Plate) for load in getattr(part, "loads", ()))
+    plates = any(load.level for load in getattr(part, "loads", ()))
     holders = [
         word
         for word, there in (("supports", getattr(part, "supports", ())), ("plates", plates))
@@ -162,11 +162,8 @@ def _balance(states: Sequence[Scene], made: Posed, free: InterfaceProblem) -> li
             found.append(where + sentence(problem, gone))
     if found or not free.motions:
         return found[:1]
-    held = np.zeros(free.q.shape, dtype=bool)
-    held[:, 0] = True
-    held[:, 1:] = (np.asarray(free.law.rough) & (free.mu > 0))[:, None]
-    loose = kernel(np.asarray(free.V)[held.ravel()], free.motions)[1]
-    return [f"neither supports nor contacts resist a motion of {name}" for name in loose]
+    names = loose_names(free, sorted_motions(free)[1])
+    return [f"neither supports nor contacts resist a motion of {name}" for name in names]
 
 
 def _posed_again(state: Scene, made: Posed) -> Posed:

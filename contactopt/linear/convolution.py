@@ -23,7 +23,7 @@ import numpy as np
 
 from contactopt.linear.concurrency import cores
 from contactopt.linear.counter import Counter
-from contactopt.linear.operators import InterfaceOperator, check_dense
+from contactopt.linear.operators import Form, InterfaceOperator, check_dense
 
 SINGLE = 2e-6  # accuracy of products from which on single precision serves
 LEVELS = 4  # halvings of the grid that its padding allows for
@@ -244,6 +244,10 @@ class Convolution(InterfaceOperator):
         self.kernel = kernel
         diagonal = np.tile(kernel.diagonal, int(np.prod(kernel.grid)))
         super().__init__(self._product, diagonal, kernel.entries, accuracy, counter=counter)
+
+    @property
+    def form(self) -> Form:
+        return "convolution"
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For other processes: the kernel is all there is to it."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 from copy import copy
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -68,6 +68,10 @@ class InterfaceOperator(LinearOperator):
         self.held = self.diagonal == 0 if held is None else held
         self.counter = counter or Counter()
         self.known: tuple[np.ndarray, Stacked] | None = None
+
+    @property
+    def form(self) -> Form:
+        return "products" if self.coupled is None else "bodies"
 
     @property
     def products(self) -> int:
@@ -152,7 +156,22 @@ class InterfaceOperator(LinearOperator):
         )
 
 
+Form = Literal["array", "sparse", "products", "bodies", "convolution"]
 Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or InterfaceOperator
+
+
+def form(Q: Interface) -> Form:
+    """How Q is known: by its entries in an array or sparse rows, or by products alone, of bodies
+    that are solved by iteration (`bodies`) or of half-spaces (`convolution`).
+    """
+    if isinstance(Q, InterfaceOperator):
+        return Q.form
+    return "sparse" if sp.issparse(Q) else "array"
+
+
+def has_entries(Q: Interface) -> bool:
+    """Whether the entries of Q are there."""
+    return form(Q) in ("array", "sparse")
 
 
 def sparse(Q: object) -> sp.csr_array:

@@ -24,8 +24,8 @@ from contactopt.checks import check_number
 from contactopt.linear.operators import eigenvalue_bound
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.balance import project_balanced
+from contactopt.methods.kernels.damped import solve_subproblem
 from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.methods.kernels.sparse_newton import solve_subproblem
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import cylinder_derivative

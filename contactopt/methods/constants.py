@@ -44,7 +44,7 @@ GENTLE_FALL, GENTLE_RISE = 1.5, 3.0
 EASY = 6
 EAGER_STEPS = 10  # Newton steps of a subproblem of the eager loop, which ends with a harder one
 
-# Its subproblems (contactopt.methods.kernels.sparse_newton).
+# Its subproblems (contactopt.methods.kernels.damped).
 SUBPROBLEM_STEPS = 15  # Newton steps of one of them
 SHORTEST = 1e-2  # step of a line search, over the full one
 MEMORY = 4  # a step is accepted whose residual is below the worst of so many before

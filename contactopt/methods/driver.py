@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from contactopt.checks import check_number
 from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
-from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
+from contactopt.linear.operators import (
+    Interface,
+    diagonal,
+    form,
+    has_entries,
+    loosened,
+)
 from contactopt.linear.stacked import Stacked
 from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
 from contactopt.methods.auto import Auto
 from contactopt.methods.method import Iterate, Known, Method, at_rest, dimensionless_start
-from contactopt.methods.notes import collected, remark
+from contactopt.methods.notes import collected, note, remark
 from contactopt.methods.small import solve_small
 from contactopt.problem import (
     Infeasible,
@@ -34,7 +40,7 @@ from contactopt.problem import (
 )
 from contactopt.problem.certificate import Moved
 from contactopt.problem.feasibility import held_apart
-from contactopt.problem.unbalanced_loads import check_equilibrium
+from contactopt.problem.unbalanced_loads import check_equilibrium, resisted
 
 CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
@@ -43,6 +49,8 @@ LEAST_PROOF = 0.3  # seconds for a proof past the time limit
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
 DOUBT, DEARER = 3, 0.25  # iterates before the proof is first looked for, and more per unknown
 SAME = 1e-11  # relative distance at which two iterates are the same state
+UNMOVED = "loads do not move it, and displacements are those without it"
+log = logging.getLogger(__name__)
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
 LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
 CONFIRM = 8  # repeated states in a row of a method that goes nowhere
@@ -108,7 +116,7 @@ def solve(
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
         remark(problem, solution)
-    return replace(solution, notes=tuple(notes))
+    return replace(solution, notes=tuple(notes)) if notes else solution
 
 
 def _method_for(
@@ -168,11 +176,13 @@ def _run(
             f"method '{type(method).__name__.lower()}' minimises an energy, which an unsymmetric Q"
             " does not have; use auto or proximal."
         )
-    if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
+    if not getattr(method, "sparse" if form(problem.Q) == "sparse" else "implicit", False):
         problem = problem.explicit()
-    scaled, scales = dimensionless(isotropic(problem))
-    stretch = problem.law.stretch(problem.dim)
-    scales = scales if stretch is None else replace(scales, stretch=stretch)
+    held, basis, loose = resisted(problem)
+    if loose:
+        note(log, f"neither supports nor contacts resist a motion of {loose}: {UNMOVED}")
+    scaled, scales = dimensionless(isotropic(held))
+    scales = replace(scales, stretch=problem.law.stretch(problem.dim), basis=basis)
     if swept is not None:
         scaled.__dict__["swept"] = swept / scales.force
     first = None if start is None else dimensionless_start(start, problem, scales)
@@ -262,7 +272,7 @@ def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
 
 def _counts(Q: Interface) -> dict[str, float]:
     """Products with an operator Q so far and, where a method works on the bodies, V-cycles."""
-    if not isinstance(Q, InterfaceOperator):
+    if has_entries(Q):
         return {}
     counts: dict[str, float] = {"products": Q.products}
     return counts if Q.coupled is None else counts | {"cycles": Q.coupled.cycles}

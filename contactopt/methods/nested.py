@@ -22,12 +22,11 @@ from typing import ClassVar
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.linear.convolution import Convolution
+from contactopt.linear.operators import form
 from contactopt.methods import constants, find_method
-from contactopt.methods.kernels.alart_curnier import forcing
-from contactopt.methods.kernels.elimination import eliminated
-from contactopt.methods.kernels.level_steps import step
+from contactopt.methods.kernels.level_steps import GridSteps
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
+from contactopt.methods.kernels.loop import newton_iterates
 from contactopt.methods.method import Iterate, Method
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem
@@ -37,7 +36,6 @@ logger = logging.getLogger(__name__)
 # residual over the size of the forces, from which on iterates of the finest grid are shown to the
 # driver
 NEAR = 1e-8
-ENOUGH = 0.5  # of NEAR that a step aims at, for linear systems are not solved in its norm
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ class Nested(Method):
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate, float]]:
         """Iterates on the finest grid with the residual of the equations."""
-        if not isinstance(problem.Q, Convolution):
+        if form(problem.Q) != "convolution":
             raise InputError(
                 "the method 'nested' needs half-spaces on both sides, or one on a rigid body; use"
                 " 'auto'."
@@ -67,29 +65,19 @@ class Nested(Method):
         if len(levels) > 1:
             point = _robust_start(levels[-1], point)
         for coarse, fine in zip(levels[:0:-1], levels[-2::-1]):
-            point, at = _solve_level(coarse, point)
+            at = _solve_level(coarse, point)
             logger.info("grid %s: residual %.1e", coarse.kernel.grid, at.residual)
-            point = fine.refined(point, coarse)
-        finest, at, last = levels[0], levels[0].evaluate(*point), np.inf
+            point = fine.refined(at.point, coarse)
+        steps, last = GridSteps(levels[0], NEAR, least=1.0), np.inf
+        begin = steps.evaluate(point)
         if given is not None:
-            other = finest.evaluate(*given)
-            if other.residual < constants.CLOSER * at.residual:
-                point, at = given, other
-        while True:
-            near = NEAR * max(1.0, float(np.linalg.norm(point[0])))
-            if at.residual <= near or at.residual > 0.5 * last:
-                yield (_whole(problem, point[0] + at.error), point[1]), at.residual
-            if at.residual > constants.SLOW * last:
-                point, at = eliminated(finest, point, at)
-            worth = _worth(at.residual, last)
-            if at.residual > near:  # no step need come further than that
-                worth = max(worth, min(ENOUGH * near / at.residual, constants.NESTED_LOOSEST))
-            change, count = step(finest, at, worth)
+            other = steps.evaluate(given)
+            begin = other if other.residual < constants.CLOSER * begin.residual else begin
+        for at in newton_iterates(steps, begin):
+            r, multipliers = at.point
+            if at.residual <= steps.near(r) or at.residual > 0.5 * last:
+                yield (_whole(problem, r + at.error), multipliers), at.residual
             last = at.residual
-            point = point[0] + change[0], point[1] + change[1]
-            at = finest.evaluate(*point)
-            told = finest.kernel.grid, len(at.closed), count, at.residual
-            logger.info("grid %s: %d closed, %d iterations, residual %.1e", *told)
 
 
 def _first_guess(levels: list[Level], given: Point | None) -> Point:
@@ -112,11 +100,9 @@ def _first_guess(levels: list[Level], given: Point | None) -> Point:
 
 def _robust_start(coarsest: Level, point: Point) -> Point:
     """A solution on the coarsest grid: by Newton's steps, or else by `auto` on an array Q."""
-    reached, at = _solve_level(coarsest, point, constants.COARSEST_ENOUGH)
-    if (
-        at.residual <= constants.COARSEST_ENOUGH * float(np.linalg.norm(reached[0]))
-        or len(coarsest.components) < coarsest.kernel.dim
-    ):
+    at = _solve_level(coarsest, point, constants.COARSEST_ENOUGH)
+    enough, reached = GridSteps(coarsest, constants.COARSEST_ENOUGH).near, at.point
+    if at.residual <= enough(reached[0]) or len(coarsest.components) < coarsest.kernel.dim:
         return reached
     note(
         logger,
@@ -133,32 +119,19 @@ def _robust_start(coarsest: Level, point: Point) -> Point:
         residual = coarsest.evaluate(*candidate).residual
         if residual < best:
             reached, best = candidate, residual
-        if best <= constants.COARSEST_ENOUGH * float(np.linalg.norm(reached[0])):
+        if best <= enough(reached[0]):
             break
     return reached
 
 
-def _solve_level(
-    level: Level, point: Point, enough: float = constants.COARSE_ENOUGH
-) -> tuple[Point, Evaluation]:
+def _solve_level(level: Level, point: Point, enough: float = constants.COARSE_ENOUGH) -> Evaluation:
     """Newton's steps on a coarse grid, until the residual is small beside the forces."""
-    at, last = level.evaluate(*point), np.inf
-    for _ in range(constants.COARSE_STEPS):
-        if at.residual <= enough * float(np.linalg.norm(point[0])):
+    steps = GridSteps(level, enough)
+    at = begin = steps.evaluate(point)
+    for at in islice(newton_iterates(steps, begin), constants.COARSE_STEPS):
+        if at.residual <= steps.near(at.point[0]):
             break
-        if at.residual > constants.SLOW * last:
-            point, at = eliminated(level, point, at)
-        change, _ = step(level, at, _worth(at.residual, last))
-        last = at.residual
-        point = point[0] + change[0], point[1] + change[1]
-        at = level.evaluate(*point)
-    return point, at
-
-
-def _worth(residual: float, last: float) -> float:
-    """Accuracy of a step: low while the residual does not fall, because contacts still change."""
-    loosest, tightest = constants.NESTED_LOOSEST, constants.NESTED_TIGHTEST
-    return forcing(residual, last, loosest, loosest, tightest)
+    return at
 
 
 def _whole(problem: InterfaceProblem, r: np.ndarray) -> np.ndarray:

@@ -15,26 +15,27 @@ for three-dimensional contact problems with Coulomb friction.
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.linear.operators import InterfaceOperator, loosened
+from contactopt.linear.operators import form, has_entries, loosened
 from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import (
     admissible,
     cold_start,
     coulomb_equations,
-    forcing,
-    newton_steps,
+    solver_of,
 )
 from contactopt.methods.kernels.balance import settled
-from contactopt.methods.kernels.coupled_newton import coupled_steps
-from contactopt.methods.kernels.krylov import model_of
+from contactopt.methods.kernels.coupled_newton import CoupledSteps
+from contactopt.methods.kernels.krylov import Krylov, model_of
+from contactopt.methods.kernels.loop import Forcing, Unknowns, newton_iterates
+from contactopt.methods.kernels.semismooth import Evaluated, Solve, evaluated
 from contactopt.methods.method import Iterate, Known, Method
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import find_preconditioner
@@ -79,47 +80,83 @@ class Newton(Method):
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[tuple[Iterate | Known, float]]:
         """Iterates with the residual before each step; InputError if `linear` does not fit."""
-        form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
-        if self.linear == "coupled" and form is None:
+        linear = self.linear or LINEAR[form(problem.Q)]
+        if linear == "coupled" and form(problem.Q) != "bodies":
             raise InputError(
                 "linear='coupled' needs bodies that are solved by iteration; take the solver"
                 " 'multigrid'."
             )
-        if form is not None and self.linear in (None, "coupled"):
-            yield from coupled_steps(problem, form, self.preconditioner, start)
-            note(logger, UNSOLVED)
-            return
-        implicit = self.linear == "krylov" or (
-            self.linear is None and isinstance(problem.Q, InterfaceOperator)
-        )
-        if self.linear == "dense" or (isinstance(problem.Q, InterfaceOperator) and not implicit):
+        if linear == "dense" and not has_entries(problem.Q):
             problem = problem.explicit()
-        equations = coulomb_equations(problem)
-        P = model_of(problem, self.preconditioner) if implicit else None
-        if P is not None and len(problem.pairs) > 1:
-            equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
-        step, first = newton_steps(problem, P)
-        r, multipliers = start or cold_start(problem, first, constants.KRYLOV_FIRST)
-        last, rtol = np.inf, constants.KRYLOV_FIRST
-        while True:
-            aim = rtol * min(last, 1.0) / max(1.0, float(np.linalg.norm(r)))
-            Q = loosened(problem.Q, SHARP * aim)
-            sharp = equations if Q is problem.Q else replace(equations, Q=Q)
-            residual, error, balance, D = sharp.evaluate(r, multipliers)
-            change = settled(sharp, problem.law, r, D, partial(sharp.displacements, r, multipliers))
-            if change is not None:
-                multipliers = multipliers + change
-                residual, error, balance, D = sharp.evaluate(r, multipliers)
-            yield (admissible(problem, r, error) if implicit else r + error, multipliers), residual
-            rtol = forcing(
-                residual,
-                last,
-                constants.KRYLOV_FIRST,
-                constants.KRYLOV_LOOSEST,
-                constants.KRYLOV_TIGHTEST,
-            )
-            moved = step(sharp, error, balance, D, rtol)
-            if moved is None:
-                note(logger, UNSOLVED)
-                return
-            r, multipliers, last = r + moved[0], multipliers + moved[1], residual
+        system = SYSTEMS[linear](problem, self.preconditioner)
+        point = system.begin(start)
+        if point is not None:
+            for at in newton_iterates(system, system.evaluate(point)):
+                yield system.shown(at), at.residual
+        note(logger, UNSOLVED)
+
+
+class Contacts:
+    """Newton's method on the equations of the contacts, by factors of an array or a sparse Q, or by
+    products with Q to the accuracy that a step is worth.
+    """
+
+    def __init__(self, problem: InterfaceProblem, preconditioner: str | None, by_products: bool):
+        self.problem, self.equations = problem, coulomb_equations(problem)
+        self.by_products = by_products
+        self.solve: Solve
+        if not by_products:
+            self.solve = solver_of(problem)
+        else:
+            P = model_of(problem, preconditioner)
+            if len(problem.pairs) > 1:
+                self.equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
+            self.solve = Krylov(P)
+        self.accuracy = Forcing(
+            constants.KRYLOV_FIRST, constants.KRYLOV_LOOSEST, constants.KRYLOV_TIGHTEST
+        )
+
+    def begin(self, start: Iterate | None) -> Iterate:
+        """The first point."""
+        return start or cold_start(self.problem, self.solve, constants.KRYLOV_FIRST)
+
+    def evaluate(self, point: Unknowns) -> Evaluated:
+        """Where products cost iterations, they are no more accurate than the step aimed at."""
+        (r, multipliers), equations = point, self.equations
+        aim = self.accuracy.accuracy * min(self.accuracy.last, 1.0)
+        Q = loosened(self.problem.Q, SHARP * aim / max(1.0, float(np.linalg.norm(r))))
+        if Q is not self.problem.Q:
+            equations = replace(equations, Q=Q)
+        at = evaluated(equations, r, multipliers)
+        displacements = partial(equations.displacements, r, multipliers)
+        change = settled(equations, self.problem.law, r, at.D, displacements)
+        if change is not None:
+            multipliers = multipliers + change
+            at = evaluated(equations, r, multipliers)
+        self.sharp = equations
+        return at
+
+    def change(self, at: Evaluated) -> Unknowns | None:
+        return self.solve(self.sharp, at, self.accuracy(at.residual))
+
+    def shown(self, at: Evaluated) -> Iterate:
+        """What the driver judges."""
+        r, multipliers = at.point
+        shown = admissible(self.problem, r, at.error) if self.by_products else r + at.error
+        return shown, multipliers
+
+
+# linear -> the system of a problem, with the preconditioner of this name
+SYSTEMS: dict[str, Callable[..., Any]] = {
+    "dense": partial(Contacts, by_products=False),
+    "krylov": partial(Contacts, by_products=True),
+    "coupled": CoupledSteps,
+}
+# form of Q -> how its steps are solved by default
+LINEAR = {
+    "array": "dense",
+    "sparse": "dense",
+    "products": "krylov",
+    "convolution": "krylov",
+    "bodies": "coupled",
+}

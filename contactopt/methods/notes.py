@@ -12,6 +12,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
+from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.certificate import amplification
 
@@ -43,7 +44,7 @@ def collected() -> Iterator[list[str]]:
 def remark(problem: InterfaceProblem, solution: Solution) -> None:
     """Say where the forces of a small problem may be far off although they are certified."""
     at, loose = solution, solution.solved and solution.residual > EXACT
-    if loose and problem.contacts <= FEW and isinstance(problem.Q, np.ndarray):
+    if loose and problem.contacts <= FEW and form(problem.Q) == "array":
         condition = amplification(problem, at.reactions, at.multipliers)
         if WEDGED < condition < np.inf and condition * at.residual > MUCH:
             asked = problem.law.proportional and not problem.law.dilatant

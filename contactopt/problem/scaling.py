@@ -10,8 +10,9 @@ import scipy.sparse as sp
 from contactopt.linear.operators import (
     NOISE,
     Interface,
-    InterfaceOperator,
     diagonal,
+    form,
+    has_entries,
     row_sizes,
     turned,
 )
@@ -23,12 +24,14 @@ class Scales:
     """Units in which a problem is dimensionless: force, length, and one length per multiplier.
 
     stretch  (k, dim - 1, dim - 1) what takes its tangential forces back (`isotropic`), or None
+    basis    (p, m) of the multipliers that the dimensionless problem has, or None for all
     """
 
     force: float
     length: float
     multipliers: np.ndarray
     stretch: np.ndarray | None = None
+    basis: np.ndarray | None = None
 
     def to_physical(
         self, reactions: np.ndarray, multipliers: np.ndarray
@@ -37,7 +40,10 @@ class Scales:
         if self.stretch is not None:
             tangential = np.einsum("kab,kb->ka", self.stretch, reactions[:, 1:])
             reactions = np.column_stack([reactions[:, 0], tangential])
-        return reactions * self.force, multipliers * self.multipliers
+        multipliers = multipliers * self.multipliers
+        if self.basis is not None:
+            multipliers = self.basis @ multipliers
+        return reactions * self.force, multipliers
 
     def to_dimensionless(
         self, reactions: np.ndarray, multipliers: np.ndarray
@@ -46,6 +52,8 @@ class Scales:
         if self.stretch is not None:
             tangential = np.linalg.solve(self.stretch, reactions[:, 1:, None])[:, :, 0]
             reactions = np.column_stack([reactions[:, 0], tangential])
+        if self.basis is not None:
+            multipliers = np.linalg.lstsq(self.basis, multipliers, rcond=None)[0]
         return reactions / self.force, multipliers / self.multipliers
 
 
@@ -83,9 +91,9 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     scales, held = scales_of(problem), immovable(problem)
     compliance, columns = scales.length / scales.force, scales.length / scales.multipliers
     Q: Interface
-    if isinstance(problem.Q, InterfaceOperator):
+    if not has_entries(problem.Q):
         Q = problem.Q.scaled(1 / compliance, held.astype(float))
-    elif sp.issparse(problem.Q):
+    elif form(problem.Q) == "sparse":
         rows = problem.Q
         Q = sp.csr_array((rows.data / compliance, rows.indices, rows.indptr), shape=rows.shape)
         if held.any():
@@ -133,7 +141,7 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
-    if held.any() and not isinstance(problem.Q, InterfaceOperator):
+    if held.any() and has_entries(problem.Q):
         rows = np.flatnonzero(held)
         held[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
     return held

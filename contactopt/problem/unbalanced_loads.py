@@ -5,7 +5,8 @@ bodies that every contact lets pass, V z in the dual cone of K, g_n >= mu |g_t| 
 z' V' r >= 0 for all such r. Where it moves the loads forward, s' z > 0, this contradicts z' V' r =
 -s' z: there is no solution, and the bodies fly apart, slide off or topple along z. A contact whose
 friction has a given bound b in place of mu r_n lets every motion with g_n >= 0 pass, and takes no
-more work than b |g_t| from it, so that there s' z > sum b |g_t| is the contradiction. Where the
+more work than b |g_t| from it, so that there s' z > sum b |g_t| is the contradiction. A contact
+that cannot open lets a motion pass with g_n = 0, and with g_t = 0 where it can rub. Where the
 forces of least squares that balance the loads are admissible there is no such motion. Otherwise the
 search for it is a linear program with a polygon inside each cone; what it finds is checked on its
 own.
@@ -32,6 +33,8 @@ SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the
 BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
 TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
+# share of a motion's displacements below which it moves no contact against what it resists
+LOOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,29 +45,40 @@ class Escape:
     strongest  number of the multiplier that moves furthest, of the body on which the loads do most
                work; where it turns without sliding, that of the rotation
     opens      whether no contact slides in it
+    loose      whether it moves no contact at all
     """
 
     motion: np.ndarray
     strongest: int
     opens: bool
+    loose: bool
 
 
 def escape(problem: InterfaceProblem) -> Escape | None:
     """Find a motion along which the loads drive the bodies away from all contacts, or None.
 
-    Looked at are laws under which contacts can only push. Where the bound of friction is neither
-    given nor mu r_n, only motions count that do not slide.
+    Where the bound of friction is neither given nor mu r_n, only motions count that do not slide.
     """
-    if not problem.law.unilateral or not np.any(problem.s):
+    if not np.any(problem.s):
         return None
     problem = isotropic(problem)
     s, given = problem.s / np.abs(problem.s).max(), _given(problem)
     if _balanced(problem, s, given):
         return None
-    motion = _search(problem, sp.csr_array(problem.V), s, given)
-    if motion is None or not _passes(problem, s, given, motion):
+    loose = sorted_motions(problem)[1]
+    alone = loose @ np.linalg.lstsq(loose, s, rcond=None)[0]
+    if _passes(problem, s, given, alone):
+        return _described(problem, s, alone)
+    found = _search(problem, sp.csr_array(problem.V), s, given)
+    if found is None or not _passes(problem, s, given, found):
         return None
+    return _described(problem, s, found)
+
+
+def _described(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> Escape:
+    """A motion that loads s (p,) drive, with what it does to which body."""
     g = (problem.V @ motion).reshape(problem.q.shape)
+    still = np.abs(g).max(initial=0.0) <= LOOSE * (np.abs(problem.V) @ np.abs(motion)).max()
     opens = bool(np.abs(g[:, 1:]).max(initial=0.0) <= FLAT * np.abs(g).max(initial=0.0))
     owners = [name.partition(":")[0] for name in problem.motions] or ["" for _ in s]
     work = {
@@ -76,7 +90,48 @@ def escape(problem: InterfaceProblem) -> Escape | None:
     turns = size * np.array(["rotation" in name for name in problem.motions] or np.zeros(len(s)))
     if opens and turns.max() > TURNING * size.max():
         size = turns
-    return Escape(motion, int(np.argmax(size)), opens)
+    return Escape(motion, int(np.argmax(size)), opens, bool(still))
+
+
+def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
+    """Bases of the motions that contacts resist (p, m) and of those (p, f) that nothing resists,
+    orthogonal to each other: they move no contact along its normal, and none along its surface
+    where it can rub.
+    """
+    resists = np.repeat(problem.law.rough[:, None], problem.dim, axis=1)
+    resists[:, 0] = True
+    sizes, count = np.linalg.norm(problem.V, axis=0), len(problem.s)
+    sizes = np.where(sizes > 0, sizes, 1.0)
+    moved = np.vstack([(problem.V / sizes)[resists.ravel()], np.zeros((count, count))])
+    _, stretches, axes = np.linalg.svd(np.linalg.qr(moved, mode="r"))
+    held, basis = stretches >= LOOSE, axes.T / sizes[:, None]
+    return basis[:, held], basis[:, ~held]
+
+
+def resisted(problem: InterfaceProblem) -> tuple[InterfaceProblem, np.ndarray | None, str]:
+    """The problem in the motions that contacts resist, their basis (p, m), and the names of the
+    others; the problem, None and '' where there are none, and where the loads push along one.
+    """
+    kept, loose = sorted_motions(problem)
+    work = np.abs(loose.T @ problem.s) > SURE * (np.abs(loose.T) @ np.abs(problem.s))
+    if not loose.shape[1] or work.any():
+        return problem, None, ""
+    names = ", ".join(loose_names(problem, loose))
+    return problem.altered(V=problem.V @ kept, s=kept.T @ problem.s, motions=()), kept, names
+
+
+def loose_names(problem: InterfaceProblem, loose: np.ndarray) -> list[str]:
+    """Names of the first motions that together determine the loose ones (p, f)."""
+    names, left = [], loose.copy()
+    for number, size in enumerate(np.linalg.norm(loose, axis=1)):
+        if (rest := np.linalg.norm(left[number])) > SURE * size:
+            names.append(_label(problem, number))
+            left -= np.outer(left @ left[number], left[number]) / rest**2
+    return names
+
+
+def _label(problem: InterfaceProblem, number: int) -> str:
+    return problem.motions[number] if problem.motions else f"column {number} of V"
 
 
 def _along(rows: sp.csr_array, dim: int) -> list[Any]:
@@ -91,16 +146,17 @@ def _given(problem: InterfaceProblem) -> np.ndarray:
     """
     force = np.abs(problem.s).max()
     bounds = [problem.law.bound(np.full(problem.contacts, r_n)) for r_n in (0.0, force)]
-    other = problem.law.rough & (problem.mu == 0)
+    other = problem.law.rough & (problem.law.coefficient == 0)
     return np.where(other, np.where(bounds[0] == bounds[1], bounds[0] / force, np.inf), 0.0)
 
 
 def _balanced(problem: InterfaceProblem, s: np.ndarray, given: np.ndarray) -> bool:
     """Whether the forces of least squares that balance the loads are admissible."""
     even = problem.V @ np.linalg.lstsq(problem.V.T @ problem.V, -s, rcond=None)[0]
-    r = even.reshape(problem.q.shape)
-    bound = problem.mu * r[:, 0] + np.where(np.isinf(given), 0.0, given)
-    held = np.all(r[:, 0] >= 0) and np.all(np.linalg.norm(r[:, 1:], axis=1) <= bound)
+    r, shut = even.reshape(problem.q.shape), problem.law.lowest < 0
+    normal = np.where(shut, np.abs(r[:, 0]), r[:, 0])
+    bound = problem.mu * normal + np.where(np.isinf(given) & ~shut, 0.0, given)
+    held = np.all(normal >= 0) and np.all(np.linalg.norm(r[:, 1:], axis=1) <= bound)
     left = np.linalg.norm(problem.V.T @ even + s)
     return bool(held and left <= BALANCED * np.linalg.norm(s))
 
@@ -108,20 +164,22 @@ def _balanced(problem: InterfaceProblem, s: np.ndarray, given: np.ndarray) -> bo
 def _search(
     problem: InterfaceProblem, V: sp.csr_array, s: np.ndarray, given: np.ndarray
 ) -> np.ndarray | None:
-    """min |z|_1 with s' z - given' w = 1, V z in a polygon inside each dual cone, and w >= |g_t| in
-    a polygon where the bound is given; None without any.
+    """min |z|_1 with s' z - given' w = 1, V z in a polygon inside each dual cone, g = 0 where a
+    contact cannot move, and w >= |g_t| in a polygon where the bound is given; None without any.
     """
     from scipy.optimize import linprog  # late, since it takes long to import
 
     normal, factor = V[:: problem.dim], polygon(problem.dim)[1]
-    fixed, bounded = np.isinf(given), np.isfinite(given) & (given > 0)
-    smooth, count = problem.mu == 0, int(np.sum(bounded))
+    shut, fixed = problem.law.lowest < 0, _stuck(problem, given)
+    bounded = np.isfinite(given) & (given > 0)
+    smooth, rubs, count = (problem.mu == 0) & ~shut, (problem.mu > 0) & ~shut, int(np.sum(bounded))
     mu, slopes = sp.diags_array(factor * problem.mu), _along(V, problem.dim)
-    rows = [-normal[smooth]] + [(mu @ slope - normal)[~smooth] for slope in slopes]
+    rows = [-normal[smooth]] + [(mu @ slope - normal)[rubs] for slope in slopes]
     within, slid = sp.vstack(rows), sp.vstack([factor * slope[bounded] for slope in slopes])
     own = sp.vstack([-sp.eye_array(count)] * len(slopes))
     blocks = np.arange(problem.q.size).reshape(problem.q.shape)
-    equal = sp.vstack([sp.csr_array(s[None]), V[blocks[fixed, 1:].ravel()]])
+    still = [V[blocks[fixed, 1:].ravel()], normal[shut]]
+    equal = sp.vstack([sp.csr_array(s[None]), *still])
     lost = sp.csr_array(-given[bounded][None])
     lost.resize(equal.shape[0], count)
     A = sp.block_array([[within, -within, None], [slid, -slid, own]], format="csr")
@@ -140,6 +198,11 @@ def _search(
     return np.asarray(answer.x[: len(s)] - answer.x[len(s) : 2 * len(s)])
 
 
+def _stuck(problem: InterfaceProblem, given: np.ndarray) -> np.ndarray:
+    """Contacts (k,) whose friction no motion along the surface overcomes for sure."""
+    return np.asarray(np.isinf(given) | ((problem.law.lowest < 0) & problem.law.rough))
+
+
 def _passes(
     problem: InterfaceProblem, s: np.ndarray, given: np.ndarray, motion: np.ndarray
 ) -> bool:
@@ -147,27 +210,32 @@ def _passes(
     g = (problem.V @ motion).reshape(problem.q.shape)
     size = np.abs(problem.V) @ np.abs(motion)
     slide = np.linalg.norm(g[:, 1:], axis=1)
-    fixed = np.isinf(given) & (slide > SLACK * size.max())
+    fixed = _stuck(problem, given) & (slide > SLACK * size.max())
     needed = np.where(fixed, np.inf, problem.mu * slide)
+    shut = problem.law.lowest < 0
     work = s * motion
     lost = np.sum(given[np.isfinite(given)] * slide[np.isfinite(given)])
     return bool(
-        np.all(g[:, 0] - needed >= -SLACK * size.max())
+        np.all((g[:, 0] - needed)[~shut] >= -SLACK * size.max())
+        and np.all(np.abs(g[shut, 0]) <= SLACK * size.max())
+        and not np.any(fixed & shut)
         and work.sum() - lost > SURE * np.abs(work).sum()
     )
 
 
 def sentence(problem: InterfaceProblem, found: Escape) -> str:
     """Say what a motion without resistance does to which body, and what to change."""
-    label = (
-        problem.motions[found.strongest] if problem.motions else f"column {found.strongest} of V"
-    )
-    body, _, motion = label.rpartition(": ")
+    body, _, motion = _label(problem, found.strongest).rpartition(": ")
     body = body or "a body"
+    if found.loose:
+        return (
+            f"the loads do not balance: neither supports nor contacts hold {body} ({motion}); add a"
+            " support, or loads that balance."
+        )
     if motion.startswith("rotation"):
         return (
             f"the load is more than the contacts can hold: {body} tips over ({motion}); change the"
-            " load or add a support."
+            " load or add a support; contactopt limit finds the load that they hold."
         )
     if found.opens:
         return (
@@ -176,7 +244,8 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
         )
     return (
         f"the load is more than the contacts can hold: {body} slides off ({motion}); press the"
-        " bodies together, or add friction or a support."
+        " bodies together, or add friction or a support; contactopt limit finds the load that they"
+        " hold."
     )
 
 
@@ -189,7 +258,11 @@ def check_equilibrium(problem: InterfaceProblem) -> None:
         if found is not None:
             raise Unbalanced(sentence(problem, found))
         return
-    if not len(problem.s) or not problem.law.unilateral:
+    if not len(problem.s):
+        return
+    if not problem.law.unilateral:
+        if (found := escape(problem)) is not None:
+            raise Unbalanced(sentence(problem, found))
         return
     V = problem.V.reshape(problem.contacts, problem.dim, -1)
     for column, s in zip(np.moveaxis(V, 2, 0), problem.s):

@@ -19,11 +19,11 @@ from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.linear.budget import NextBest, TooDear, open_budget
-from contactopt.linear.convolution import Convolution
-from contactopt.linear.operators import InterfaceOperator, loosened
+from contactopt.linear.operators import form, loosened
+from contactopt.methods.auto import Auto
 from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.transfer import transfer
 from contactopt.readings.constants import BALANCED, BEARABLE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
 from contactopt.readings.validity import validity
@@ -35,6 +35,9 @@ from contactopt.solving.sliding import sliding, sliding_words
 
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
+# Steps of the default method, of which those of Newton and along interior paths are some forty,
+# until it is asked whether a state slides. One that does not begins anew, without this bound.
+FIRST_TRY = 64
 STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselves
 
 
@@ -166,7 +169,7 @@ def _one_way(
     coarse: dict[str, float] = {}
     Q = reduction.problem.Q
     # half-spaces have coarse grids of their own
-    products = isinstance(Q, InterfaceOperator) and not isinstance(Q, Convolution) and not Q.coupled
+    products = form(Q) == "products"
     coarser = elements // FACTOR[scene.dim]
     first = options.restart.start(reduction) if options.restart and start is None else None
     if start is None and first is None and products and not scene.given and coarser >= COARSEST:
@@ -205,6 +208,17 @@ def _solved(
 
     def answer(problem: InterfaceProblem, start: Solution | None) -> Solution:
         found = certified(problem, start, options.tol)
+        usual = (
+            options.method in (None, "auto", Auto()) and "max_iterations" not in options.settings
+        )
+        if found is None and usual and problem.motions:
+            few: dict[str, Any] = {
+                "progress": lines,
+                "max_iterations": FIRST_TRY,
+            } | options.of_solve
+            tried = solve(problem, start=start, **few)
+            ended = tried.status is not Status.ITERATION_LIMIT
+            found = tried if ended or sliding(problem, tried, start) else None
         return found or solve(problem, start=start, **({"progress": lines} | options.of_solve))
 
     seconds = Counter(reduction.seconds)

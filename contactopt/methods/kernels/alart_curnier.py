@@ -1,5 +1,5 @@
-"""Alart and Curnier's equations of contact and friction, their Newton steps, dense or by Krylov
-methods, and where to start.
+"""Alart and Curnier's equations of contact and friction, their Newton steps by factors, and where
+to start.
 
 r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the map of the law (contactopt.problem.laws,
                                       `project`)
@@ -7,52 +7,33 @@ r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the map of the law (conta
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from contactopt.linear.deadline import enough
-from contactopt.linear.operators import diagonal
-from contactopt.methods.constants import LAST_LOOSEST, LAST_SHARE, LOOSE
+from contactopt.linear.operators import diagonal, form
+from contactopt.methods.constants import LOOSE
 from contactopt.methods.kernels.bonded import LEAST_PIVOT, Bonded, bonded
-from contactopt.methods.kernels.krylov import krylov_step
-from contactopt.methods.kernels.semismooth import RIDGE, Equations
+from contactopt.methods.kernels.semismooth import (
+    RIDGE,
+    Equations,
+    Evaluated,
+    Factored,
+    Solve,
+    evaluated,
+)
 from contactopt.methods.kernels.sparse_blocks import block_matrix, factorised
-from contactopt.methods.kernels.sparse_newton import block_step
 from contactopt.methods.method import Iterate
-from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 
 LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
 LEAST_FELT = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
-
-# equations, error, balance, D, relative accuracy -> dr, dlambda or None where the linear system is
-# singular
-Step = Callable[[Equations, np.ndarray, np.ndarray, np.ndarray, float], Iterate | None]
-
-
-def forcing(residual: float, last: float, first: float, loosest: float, tightest: float) -> float:
-    """Choose the relative accuracy of the linear system of a Newton step that is worth its price,
-    from the residual of the equations now and before the last step; `last` is infinite before the
-    first step, whose accuracy is given. The step
-    that ends a solve need not come further than that asks.
-
-    Source: Eisenstat, Walker (1996), Choosing the forcing terms in an inexact Newton method, SIAM
-    J. Sci. Comput. 17, 16-32.
-    """
-    if last in (0.0, np.inf):
-        worth = first if last else tightest
-    else:
-        worth = min(loosest, max(tightest, 0.5 * (residual / last) ** 2))
-    return max(worth, min(LAST_LOOSEST, LAST_SHARE * enough()))
 
 
 def coulomb_equations(
@@ -89,7 +70,7 @@ def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> n
 def definite(Q: np.ndarray | sp.csr_array) -> bool:
     """Whether a symmetric Q is safely positive definite; False if its factorisation fails."""
     try:
-        if sp.issparse(Q):
+        if form(Q) == "sparse":
             factors = splu(
                 sp.csc_array(Q),
                 permc_spec="MMD_AT_PLUS_A",
@@ -104,48 +85,34 @@ def definite(Q: np.ndarray | sp.csr_array) -> bool:
     return bool(pivots.min() > LEAST_PIVOT**2 * pivots.max())
 
 
-def newton_steps(problem: InterfaceProblem, P: Preconditioner | None = None) -> tuple[Step, Step]:
-    """Newton's steps and the bonded solution: by products with Q, or by its factors."""
-    if P is not None:
+@dataclass(frozen=True, eq=False)
+class Sticking:
+    """Steps through the bonded system of elastic bodies that a plate presses together, while few
+    contacts are open or slip; else by `others`.
+    """
 
-        def step(equations, error, balance, D, rtol):  # type: ignore[no-untyped-def]
-            return krylov_step(equations, P, error, balance, D, rtol)
+    bonded: Bonded
+    others: Factored
 
-        return step, step
-    solver: Callable[..., Iterate | None]
-    if sp.issparse(problem.Q):
-        solver = partial(block_step, matrix=block_matrix(problem.Q, problem.dim))
-    else:
-        # it pays for elastic bodies that a plate presses together
-        factor = bonded(problem) if len(problem.s) else None
-        solver = partial(_dense_step, factor=factor)
-
-    def exact(ridge: float) -> Step:
-        return lambda equations, error, balance, D, rtol: solver(
-            equations, error=error, balance=balance, D=D, ridge=ridge
-        )
-
-    return exact(RIDGE), exact(GLUE)
+    def __call__(
+        self, equations: Equations, at: Evaluated, rtol: float = 0.0, ridge: float = RIDGE
+    ) -> Iterate | None:
+        loose = np.any(np.eye(at.D.shape[1]) != at.D, axis=(1, 2))
+        if loose.sum() <= LOOSE * len(loose):
+            with suppress(la.LinAlgError, np.linalg.LinAlgError):
+                return self.bonded.step(equations.rho, at.error, at.balance, at.D)
+        return self.others(equations, at, rtol, ridge)
 
 
-def _dense_step(
-    equations: Equations,
-    factor: Bonded | None,
-    error: np.ndarray,
-    balance: np.ndarray,
-    D: np.ndarray,
-    ridge: float,
-) -> Iterate | None:
-    """One dense step, through the bonded system while few contacts are open or slip."""
-    loose = np.any(np.eye(D.shape[1]) != D, axis=(1, 2))
-    if factor is not None and loose.sum() <= LOOSE * len(loose):
-        with suppress(la.LinAlgError, np.linalg.LinAlgError):
-            return factor.step(equations.rho, error, balance, D)
-    return equations.step(error, balance, D, ridge)
+def solver_of(problem: InterfaceProblem) -> Solve:
+    """How an array or a sparse Q solves the systems of Newton's steps."""
+    factored = Factored(block_matrix(problem.Q, problem.dim))
+    made = bonded(problem) if len(problem.s) and form(problem.Q) == "array" else None
+    return factored if made is None else Sticking(made, factored)
 
 
 def cold_start(
-    problem: InterfaceProblem, step: Step | None = None, accuracy: float = 0.0
+    problem: InterfaceProblem, solve: Solve | None = None, accuracy: float = 0.0
 ) -> Iterate:
     """Find the bonded solution of a dimensionless problem, from which Newton's method starts, to a
     relative accuracy; by default with factors.
@@ -158,12 +125,12 @@ def cold_start(
     if not glued.any():
         return zero
     equations = coulomb_equations(problem)
-    if isinstance(problem.Q, np.ndarray) and not len(problem.s):
+    if form(problem.Q) == "array" and not len(problem.s):
         bonded = _bonded(problem, np.repeat(glued, problem.dim))
     else:
         glue = replace(glued_projection(equations, glued), rho=np.ones(problem.contacts))
-        _, error, balance, D = glue.evaluate(*zero)
-        bonded = (step or newton_steps(problem)[1])(glue, error, balance, D, accuracy)
+        solve = solve or solver_of(problem)
+        bonded = solve(glue, evaluated(glue, *zero), accuracy, GLUE)
     if bonded is None or len(problem.s):
         return bonded or zero
     return min(zero, bonded, key=lambda point: equations.evaluate(*point)[0])

@@ -65,7 +65,7 @@ class Bonded:
     def step(
         self, rho: np.ndarray, error: np.ndarray, balance: np.ndarray, D: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The Newton step that `Equations.step` takes; LinAlgError if it is singular."""
+        """The Newton step that factors of Q give (`Factored`); LinAlgError if it is singular."""
         k, d = error.shape
         # N are unknowns of contacts that are open or slip; the right side of others is error / rho.
         loose = np.flatnonzero(np.any(np.eye(d) != D, axis=(1, 2)))

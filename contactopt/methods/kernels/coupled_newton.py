@@ -19,9 +19,9 @@ systems; Murphy, Golub, Wathen (2000), A note on preconditioning for indefinite 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,13 +34,13 @@ from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import (
     admissible,
     coulomb_equations,
-    forcing,
     glued_contacts,
     glued_projection,
 )
 from contactopt.methods.kernels.balance import settled
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.linearised import Linearised
+from contactopt.methods.kernels.loop import Forcing, Unknowns
 from contactopt.methods.kernels.semismooth import Equations
 from contactopt.methods.method import Iterate, Known
 from contactopt.methods.preconditioners import Preconditioner
@@ -51,13 +51,17 @@ USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experime
 IDLE = 3  # steps without progress after which it begins anew
 
 
-@dataclass(frozen=True, eq=False)
-class State:
+class State(NamedTuple):
     """Displacements X of the bodies, contact forces r (k, d) and multipliers (p,)."""
 
     X: Stacked
     r: np.ndarray
     multipliers: np.ndarray
+
+    def plus(self, change: State, times: float = 1.0) -> State:
+        """The sum with so many times a change."""
+        X, r, multipliers = change
+        return State(self.X + times * X, self.r + times * r, self.multipliers + times * multipliers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +102,7 @@ class Coupled:
         forces = self.form.stiffness(X) - self.form.pulled(r)
         return _joined(forces, linearised.rows(r, moved + V @ multipliers), V.T @ r)
 
-    def change(self, right: Stacked, linearised: Linearised, rtol: float) -> Stacked:
+    def solve(self, right: Stacked, linearised: Linearised, rtol: float) -> Stacked:
         """The changes that Newton's step makes for a right side, to a relative accuracy."""
         form, inverse = self.form, linearised.rough(self.P)
         model = (lambda x: self.P @ x) if self.P.model is None else self.P.model.matvec
@@ -111,13 +115,13 @@ class Coupled:
         product = partial(self.product, linearised)
         return flexible_gmres(product, precondition, right, self.weights, rtol)
 
-    def step(self, at: State, right: Stacked, linearised: Linearised, rtol: float) -> State | None:
-        """The state after Newton's step, or None if its linear system could not be solved."""
-        change = self.change(right, linearised, rtol)
+    def change(self, right: Stacked, linearised: Linearised, rtol: float) -> State | None:
+        """Newton's step, or None if its linear system could not be solved."""
+        change = self.solve(right, linearised, rtol)
         if not np.isfinite(norm(change)):
             return None
         X, r, multipliers = _parted(change)
-        return State(at.X + X, at.r + r.reshape(at.r.shape), at.multipliers + multipliers)
+        return State(X, r.reshape(self.equations.q.shape), multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
         """The forces r + error, at the solution equal to r, with what Q makes of them.
@@ -140,66 +144,89 @@ def improved(form: CoupledForm, X: Stacked, r: np.ndarray) -> Moved:
     return Moved(form.moved(better, r.ravel()), float(accuracy), better)
 
 
-def coupled_steps(
-    problem: InterfaceProblem, form: CoupledForm, preconditioner: str | None, start: Iterate | None
-) -> Iterator[tuple[Known, float]]:
-    """Iterates of Newton's method on contacts and bodies, each with the residual before its step.
+@dataclass(frozen=True, eq=False)
+class CoupledAt:
+    """The right side of Newton's step at a point, its contact equations and its residual."""
 
-    `form` is the dimensionless problem's Q before condensation; `start` None stands for the bonded
-    solution. Where the residual does not fall for more than IDLE steps, a rough start has led the
-    sorting of the contacts into a circle, and the iteration begins anew, once, from an accurate
-    bonded solution. It ends where a step fails.
+    point: State
+    residual: float
+    right: Stacked
+    linearised: Linearised
+
+
+class CoupledSteps:
+    """Newton's method on contacts and bodies, from the bonded solution or a given start.
+
+    `form` is the dimensionless problem's Q before condensation. Where the residual does not fall
+    for more than IDLE steps, a rough start has led the sorting of the contacts into a circle, and
+    the iteration begins anew, once, from an accurate bonded solution.
     """
-    with one_blas_thread():
-        several = len(problem.pairs) > 1
-        P = model_of(problem, preconditioner, deflate=several)
-        equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
-        coupled = Coupled(equations, form, P if several else fitted(P, form, problem.V))
-        before = spent()
-        at = (
-            _bonded(problem, coupled, constants.COUPLED_FIRST)
-            if start is None
-            else State(in_equilibrium(form, start[0], constants.GIVEN_BALANCE), *start)
-        )
-        if start is None:
-            expect(slower=(spent() - before) / (USUAL * form.size))
-    first, last, best, idle = constants.COUPLED_FIRST, np.inf, np.inf, 0
-    while at is not None:
+
+    def __init__(self, problem: InterfaceProblem, preconditioner: str | None):
+        self.problem, form, several = problem, problem.Q.coupled, len(problem.pairs) > 1
+        with one_blas_thread():
+            P = model_of(problem, preconditioner, deflate=several)
+            equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
+            self.coupled = Coupled(equations, form, P if several else fitted(P, form, problem.V))
+        self.restart(constants.COUPLED_FIRST)
+        self.best = np.inf
+
+    def restart(self, first: float) -> None:
+        self.accuracy = Forcing(first, constants.COUPLED_LOOSEST, constants.COUPLED_TIGHTEST)
+        self.idle = 0
+
+    def begin(self, start: Iterate | None) -> State | None:
+        """The first point; None if there is none."""
+        form, before = self.coupled.form, spent()
+        with one_blas_thread():
+            if start is not None:
+                return State(in_equilibrium(form, start[0], constants.GIVEN_BALANCE), *start)
+            bonded = self._bonded()
+        expect(slower=(spent() - before) / (USUAL * form.size))
+        return bonded
+
+    def evaluate(self, point: Unknowns) -> CoupledAt:
+        at, coupled = State(*point), self.coupled
         with one_blas_thread():
             right, linearised = coupled.linearised(at)
-            displacements = partial(coupled.moved, at)
-            change = settled(equations, problem.law, at.r, linearised.D, displacements)
+            displacements, law = partial(coupled.moved, at), self.problem.law
+            change = settled(coupled.equations, law, at.r, linearised.D, displacements)
             if change is not None:
-                at = replace(at, multipliers=at.multipliers + change)
+                at = at._replace(multipliers=at.multipliers + change)
                 right, linearised = coupled.linearised(at)
-            residual = coupled.size(right)
-            error = _parted(right)[1].reshape(at.r.shape)
-            known = coupled.judged(at, admissible(problem, at.r, error) - at.r)
-        yield known, residual
-        best, idle = min(best, residual), 0 if residual < best else idle + 1
-        if idle > IDLE and first > constants.COUPLED_TIGHTEST:
-            first, last, idle = constants.COUPLED_TIGHTEST, np.inf, 0
-            with one_blas_thread():
-                at = _bonded(problem, coupled, first)
-            continue
-        rtol = forcing(residual, last, first, constants.COUPLED_LOOSEST, constants.COUPLED_TIGHTEST)
+            return CoupledAt(at, coupled.size(right), right, linearised)
+
+    def change(self, at: CoupledAt) -> Unknowns | None:
+        self.idle = 0 if at.residual < self.best else self.idle + 1
+        self.best = min(self.best, at.residual)
         with one_blas_thread():
-            at, last = coupled.step(at, right, linearised, rtol), residual
+            if self.idle > IDLE and self.accuracy.first > constants.COUPLED_TIGHTEST:
+                self.restart(constants.COUPLED_TIGHTEST)
+                bonded = self._bonded()
+                return None if bonded is None else bonded.plus(at.point, -1.0)
+            rtol = self.accuracy(at.residual)
+            return self.coupled.change(at.right, at.linearised, rtol)
 
+    def shown(self, at: CoupledAt) -> Known:
+        """What the driver judges."""
+        r, error = at.point.r, _parted(at.right)[1].reshape(at.point.r.shape)
+        with one_blas_thread():
+            return self.coupled.judged(at.point, admissible(self.problem, r, error) - r)
 
-def _bonded(problem: InterfaceProblem, coupled: Coupled, rtol: float) -> State | None:
-    """The bonded solution of `cold_start` to a relative accuracy, or no force at all."""
-    none = np.zeros(problem.q.shape)
-    zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
-    glued = glued_contacts(problem)
-    if not glued.any():
-        return zero
-    glue = Coupled(glued_projection(coupled.equations, glued), coupled.form, coupled.P)
-    right, linearised = glue.linearised(zero)
-    bonded = glue.step(zero, right, linearised, rtol)
-    if bonded is None or len(problem.s):
-        return bonded or zero
-    return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
+    def _bonded(self) -> State | None:
+        """The bonded solution of `cold_start`, as accurate as the first step, or no force."""
+        problem, coupled = self.problem, self.coupled
+        none = np.zeros(problem.q.shape)
+        zero = State(coupled.form.pulled(none.ravel()), none, np.zeros(len(problem.s)))
+        glued = glued_contacts(problem)
+        if not glued.any():
+            return zero
+        glue = Coupled(glued_projection(coupled.equations, glued), coupled.form, coupled.P)
+        change = glue.change(*glue.linearised(zero), self.accuracy.first)
+        bonded = None if change is None else zero.plus(change)
+        if bonded is None or len(problem.s):
+            return bonded or zero
+        return min(zero, bonded, key=lambda state: coupled.size(coupled.linearised(state)[0]))
 
 
 def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditioner:

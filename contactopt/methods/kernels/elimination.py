@@ -16,18 +16,18 @@ from scipy.ndimage import binary_dilation
 
 from contactopt.methods import constants, find_method
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
-from contactopt.methods.kernels.levels import Evaluation, Level, Point
+from contactopt.methods.kernels.levels import Evaluation, Level
 from contactopt.problem import InterfaceProblem
 
 
-def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evaluation]:
-    """Solve the contacts that make most of the residual by themselves, and return the point with
-    these forces and its errors; the same point where the errors are spread widely or do not fall.
+def eliminated(level: Level, at: Evaluation) -> Evaluation:
+    """Solve the contacts that make most of the residual by themselves, and return the errors with
+    these forces; the same ones where they are spread widely or do not fall.
     """
     some = _worst(level, at)
     if not len(some) or len(level.components) < level.kernel.dim:
-        return point, at
-    (r, lam), Q = point, level.kernel.entries(some)
+        return at
+    (r, lam), Q = at.point, level.kernel.entries(some)
     moved = (level.product(r) + level.V @ lam + level.q)[:, some].T
     begin = np.ascontiguousarray(r[:, some].T)
     q = moved - (Q @ begin.ravel()).reshape(begin.shape)
@@ -35,7 +35,7 @@ def eliminated(level: Level, point: Point, at: Evaluation) -> tuple[Point, Evalu
     other = r.copy()
     other[:, some] = found.T
     new = level.evaluate(other, lam)
-    return ((other, lam), new) if new.residual < at.residual else (point, at)
+    return new if new.residual < at.residual else at
 
 
 def _worst(level: Level, at: Evaluation) -> np.ndarray:

@@ -19,16 +19,17 @@ whatever sticks, slips or is open. Q is needed once per iteration.
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
 from contactopt.errors import InputError
-from contactopt.linear.operators import loosened
+from contactopt.linear.operators import Interface, loosened
 from contactopt.methods.constants import MODEL_PRODUCTS, MODEL_STEP, PRODUCT_SHARE
 from contactopt.methods.kernels.linearised import CYCLES, RESTART, Border, Linearised
-from contactopt.methods.kernels.semismooth import Equations
+from contactopt.methods.kernels.semismooth import Equations, Evaluated
 from contactopt.methods.method import Iterate
 from contactopt.methods.notes import note
 from contactopt.methods.preconditioners import (
@@ -76,79 +77,72 @@ def model_of(
     return Preconditioner(problem.q.size, lambda x: x)
 
 
-def krylov_step(
-    equations: Equations,
-    P: Preconditioner,
-    error: np.ndarray,
-    balance: np.ndarray,
-    D: np.ndarray,
-    rtol: float,
-) -> Iterate | None:
-    """A Newton step dr (k, d), dlambda (p,) as of `Equations.step`, from products with Q alone, to
-    a relative accuracy; None if the iteration does not get anywhere.
-    """
-    if np.array_equal(D, D.transpose(0, 2, 1)):
-        dr, multipliers = _symmetric_step(equations, P, error, balance, D, rtol)
-    else:
-        Q, linearised = loosened(equations.Q, PRODUCT_SHARE * rtol), Linearised(equations, D)
-        inverse = linearised.inverse(P, MODEL_STEP * rtol)
-        dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error.ravel(), balance, rtol)
-    if not (np.all(np.isfinite(dr)) and np.all(np.isfinite(multipliers))):
-        return None
-    return dr.reshape(error.shape), multipliers
+@dataclass(frozen=True, eq=False)
+class Krylov:
+    """Steps from products with Q alone, preconditioned by P."""
 
+    P: Preconditioner
 
-def _symmetric_step(
-    equations: Equations,
-    P: Preconditioner,
-    error: np.ndarray,
-    balance: np.ndarray,
-    D: np.ndarray,
-    rtol: float,
-) -> Iterate:
-    Q, V = loosened(equations.Q, PRODUCT_SHARE * rtol), equations.V
-    # The unknowns alpha are the amounts of the directions U in which a contact may still change its
-    # force.
-    U, delta, rho = _directions(D, equations.rho)
-    # B of the module's head; a proximal subproblem adds its weight to Q.
-    added = (1 - delta) / (delta * rho) + equations.weight
-    # dr0, the part of the step outside these directions, is known at once.
-    known = error.ravel() - U @ (U.T @ error.ravel())
-    right = (U.T @ error.ravel()) / (delta * rho)
-    if np.any(known):
-        right -= U.T @ (Q @ known)
-    # In these directions the balance reads W' alpha = b.
-    W, b = U.T @ V, -balance - V.T @ known
-    m = len(delta)
-    if m == 0:
-        return known, np.zeros(len(balance))
-    # N, an approximate inverse of the system U'QU + B, keeps the balance by two projections: off,
-    # and its transpose, which removes multipliers from a residual.
-    near = restricted(P, U, added)
-    border = Border(lambda x: near @ x, W, W)
-    off, Y, K = border.off, border.Y, border.K
+    def __call__(
+        self, equations: Equations, at: Evaluated, rtol: float = 0.0, ridge: float = 0.0
+    ) -> Iterate | None:
+        """As `Solve`, without a ridge; None if the iteration does not get anywhere."""
+        Q = loosened(equations.Q, PRODUCT_SHARE * rtol)
+        if np.array_equal(at.D, at.D.transpose(0, 2, 1)):
+            dr, multipliers = self._symmetric(equations, at, Q, rtol)
+        else:
+            linearised, error = Linearised(equations, at.D), at.error.ravel()
+            inverse = linearised.inverse(self.P, MODEL_STEP * rtol)
+            dr, multipliers = linearised.solve(lambda x: Q @ x, inverse, error, at.balance, rtol)
+        if not (np.all(np.isfinite(dr)) and np.all(np.isfinite(multipliers))):
+            return None
+        return dr.reshape(at.error.shape), multipliers
 
-    def off_t(x: np.ndarray) -> np.ndarray:
-        return np.asarray(x - W @ (K @ (Y.T @ x)))
+    def _symmetric(self, equations: Equations, at: Evaluated, Q: Interface, rtol: float) -> Iterate:
+        V, error = equations.V, at.error.ravel()
+        # The unknowns alpha are the amounts of the directions U in which a contact may still change
+        # its force.
+        U, delta, rho = _directions(at.D, equations.rho)
+        # B of the module's head; a proximal subproblem adds its weight to Q.
+        added = (1 - delta) / (delta * rho) + equations.weight
+        # dr0, the part of the step outside these directions, is known at once.
+        known = error - U @ (U.T @ error)
+        right = (U.T @ error) / (delta * rho)
+        if np.any(known):
+            right -= U.T @ (Q @ known)
+        # In these directions the balance reads W' alpha = b.
+        W, b = U.T @ V, -at.balance - V.T @ known
+        m = len(delta)
+        if m == 0:
+            return known, np.zeros(len(b))
+        # N, an approximate inverse of the system U'QU + B, keeps the balance by two projections:
+        # off, and its transpose, which removes multipliers from a residual.
+        near = restricted(self.P, U, added)
+        border = Border(lambda x: near @ x, W, W)
+        off, Y, K = border.off, border.Y, border.K
 
-    def product(x: np.ndarray) -> np.ndarray:
-        return np.asarray(U.T @ (Q @ (U @ x)) + added * x)
+        def off_t(x: np.ndarray) -> np.ndarray:
+            return np.asarray(x - W @ (K @ (Y.T @ x)))
 
-    # Start at an alpha that has the balance; all corrections then keep it.
-    start = Y @ (K @ b)
-    residual = right - product(start) if np.any(start) else right
-    system = LinearOperator((m, m), matvec=lambda x: off_t(product(off(x.ravel()))), dtype=float)
-    inverse = LinearOperator((m, m), matvec=lambda x: off(near @ off_t(x.ravel())), dtype=float)
-    # The residual is compared with the right side without multipliers, or with the first residual
-    # if that is larger.
-    size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
-    beta, _ = cg(
-        system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES
-    )
-    alpha = start + off(beta)
-    # The multipliers are what is left of the residual, which lies in the range of W.
-    multipliers = K @ (Y.T @ (right - product(alpha))) if len(b) else b
-    return known + U @ alpha, multipliers
+        def product(x: np.ndarray) -> np.ndarray:
+            return np.asarray(U.T @ (Q @ (U @ x)) + added * x)
+
+        # Start at an alpha that has the balance; all corrections then keep it.
+        start = Y @ (K @ b)
+        residual = right - product(start) if np.any(start) else right
+        shape = m, m
+        system = LinearOperator(shape, matvec=lambda x: off_t(product(off(x.ravel()))), dtype=float)
+        inverse = LinearOperator(shape, matvec=lambda x: off(near @ off_t(x.ravel())), dtype=float)
+        # The residual is compared with the right side without multipliers, or with the first
+        # residual if that is larger.
+        size = max(np.linalg.norm(off_t(right)), np.linalg.norm(off_t(residual)))
+        beta, _ = cg(
+            system, off_t(residual), rtol=0.0, atol=rtol * size, M=inverse, maxiter=RESTART * CYCLES
+        )
+        alpha = start + off(beta)
+        # The multipliers are what is left of the residual, which lies in the range of W.
+        multipliers = K @ (Y.T @ (right - product(alpha))) if len(b) else b
+        return known + U @ alpha, multipliers
 
 
 def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, np.ndarray]:

@@ -10,31 +10,62 @@ contacts that are closed and to the directions that are held.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from contactopt.methods import constants
 from contactopt.methods.constants import FIRST_SHIFT, SHIFT_RATIO
+from contactopt.methods.kernels.elimination import eliminated
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.methods.kernels.linearised import Border
+from contactopt.methods.kernels.loop import Forcing, Unknowns
 
+logger = logging.getLogger(__name__)
+
+ENOUGH = 0.5  # of what is enough that a step aims at, for linear systems are not solved in its norm
 RESTART, CYCLES = 40, 3  # of GMRES
 ITERATIONS = 100  # of PCG
 
 Act = Callable[[np.ndarray], np.ndarray]
 
 
-def step(level: Level, at: Evaluation, rtol: float) -> tuple[Point, int]:
-    """A Newton step dr (c, k), dlambda (p,) to a relative accuracy, and its iterations."""
-    known = at.error.copy()
-    known[:, at.closed] = 0.0
-    balance = -at.balance - np.einsum("ckp,ck->p", level.V, known)
-    identity = np.array_equal(at.D, np.broadcast_to(np.eye(len(known)), at.D.shape))
-    solve = _symmetric if identity else _unsymmetric
-    dr, lam, count = solve(level, at, known, balance, rtol)
-    known[:, at.closed] = dr
-    return (known, lam), count
+class GridSteps:
+    """Newton's method on one grid, until the residual is `enough` of the forces; forces below
+    `least` count as so much. No step need come further than that. Where the residual does not fall,
+    the contacts to blame are solved by themselves.
+    """
+
+    def __init__(self, level: Level, enough: float, least: float = 0.0):
+        self.level, self.enough, self.least = level, enough, least
+        loosest = constants.NESTED_LOOSEST
+        self.accuracy = Forcing(loosest, loosest, constants.NESTED_TIGHTEST)
+
+    def near(self, r: np.ndarray) -> float:
+        """The residual that is enough at forces r."""
+        return self.enough * max(self.least, float(np.linalg.norm(r)))
+
+    def evaluate(self, point: Unknowns) -> Evaluation:
+        at = self.level.evaluate(*point)
+        some = at.residual > constants.SLOW * self.accuracy.last
+        return eliminated(self.level, at) if some and at.residual > self.near(point[0]) else at
+
+    def change(self, at: Evaluation) -> Point:
+        worth, near = self.accuracy(at.residual), self.near(at.point[0])
+        if at.residual > near:
+            worth = max(worth, min(ENOUGH * near / at.residual, constants.NESTED_LOOSEST))
+        known = at.error.copy()
+        known[:, at.closed] = 0.0
+        balance = -at.balance - np.einsum("ckp,ck->p", self.level.V, known)
+        identity = np.array_equal(at.D, np.broadcast_to(np.eye(len(known)), at.D.shape))
+        solve = _symmetric if identity else _unsymmetric
+        dr, lam, count = solve(self.level, at, known, balance, worth)
+        known[:, at.closed] = dr
+        told = self.level.kernel.grid, len(at.closed), count, at.residual
+        logger.info("grid %s: %d closed, %d iterations from residual %.1e", *told)
+        return known, lam
 
 
 def _act(level: Level, at: Evaluation) -> Callable[..., np.ndarray]:

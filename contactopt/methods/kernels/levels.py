@@ -10,9 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
-from contactopt.linear.convolution import Convolution, Kernel, backward, forward
+from contactopt.linear.convolution import Kernel, backward, forward
 from contactopt.linear.counter import Counter
 from contactopt.linear.deadline import check_time
+from contactopt.linear.operators import form
 from contactopt.methods.constants import COARSEST, LEAST_DETERMINANT, LEAST_SYMBOL
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
@@ -42,7 +43,7 @@ class Level:
     @classmethod
     def of_problem(cls, problem: InterfaceProblem) -> Level:
         """The finest level; problem.Q is a Convolution."""
-        assert isinstance(problem.Q, Convolution)
+        assert form(problem.Q) == "convolution"
         kernel, law = problem.Q.kernel, problem.law
         smooth = law.proportional and not law.rough.any()
         components = (0,) if smooth else tuple(range(problem.dim))
@@ -132,7 +133,7 @@ class Level:
             moves = np.any(D != 0, axis=(1, 2))
             closed, D = busy[moves], D[moves]
         balance = np.einsum("ckp,ck->p", self.V, r) + self.s
-        return Evaluation(error, balance, closed, D)
+        return Evaluation((r, lam), error, balance, closed, D)
 
     @cached_property
     def inverse(self) -> Symbols:
@@ -199,6 +200,7 @@ class Level:
 class Evaluation:
     """Errors at a point: error (c, k), balance (p,), m contacts with a derivative D (m, c, c)."""
 
+    point: Point
     error: np.ndarray
     balance: np.ndarray
     closed: np.ndarray

@@ -11,14 +11,16 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import islice
 from math import sqrt
+from typing import Protocol
 
 import numpy as np
 
 from contactopt.errors import BackendError
-from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import Interface
-from contactopt.methods.kernels.sparse_blocks import assembled, factorised
+from contactopt.methods.kernels.loop import Unknowns, newton_iterates
+from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.methods.method import Iterate
 from contactopt.methods.notes import note
 
@@ -75,41 +77,82 @@ class Equations:
         error, balance = P - r, self.V.T @ r.ravel() + self.s
         return sqrt(np.vdot(error, error) + balance @ balance), error, balance, D
 
-    def step(
-        self, error: np.ndarray, balance: np.ndarray, D: np.ndarray, ridge: float = RIDGE
-    ) -> Iterate | None:
-        """dr (k, d), dlambda (p,) of one Newton step; None if the linear system is singular.
 
-        It solves (I - D (I - rho Q)) dr + D rho V dlambda = error, V' dr = -balance. Open contacts,
-        D = 0, are known at once and leave the system. Where D = I, in stick or in contact without
-        friction, its rows are those of rho Q.
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """Equations at a point: the residual, P(y) - r (k, d), V'r + s (p,), derivative D (k, d, d)."""
+
+    point: Iterate
+    residual: float
+    error: np.ndarray
+    balance: np.ndarray
+    D: np.ndarray
+
+
+def evaluated(equations: Equations, r: np.ndarray, multipliers: np.ndarray) -> Evaluated:
+    """The equations at forces r (k, d) and multipliers (p,)."""
+    return Evaluated((r, multipliers), *equations.evaluate(r, multipliers))
+
+
+class Solve(Protocol):
+    """How the linear system of a Newton step is solved, which depends on the form of Q."""
+
+    def __call__(
+        self, equations: Equations, at: Evaluated, rtol: float = 0.0, ridge: float = RIDGE
+    ) -> Iterate | None:
+        """dr (k, d) and dlambda (p,) with (I - D (I - rho Q)) dr + D rho V dlambda = error and V'
+        dr = -balance, to a relative accuracy; None if the system is singular. Factors are those of
+        Q + ridge.
         """
-        k, d = error.shape
-        dr = error.ravel().copy()
-        # Open contacts: dr = error. The unknowns are the other dr and dlambda, in one square
-        # matrix.
-        kept = np.repeat(D.reshape(k, d * d).any(axis=1), d)
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """Newton's method on equations, whose linear systems `solve` solves."""
+
+    equations: Equations
+    solve: Solve
+    accuracy: Callable[[Evaluated], float] = lambda at: 0.0
+    ridge: float = RIDGE
+
+    def evaluate(self, point: Unknowns) -> Evaluated:
+        return evaluated(self.equations, *point)
+
+    def change(self, at: Evaluated) -> Iterate | None:
+        return self.solve(self.equations, at, self.accuracy(at), self.ridge)
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """Steps by the factors of a block system."""
+
+    matrix: Blocks
+
+    def __call__(
+        self, equations: Equations, at: Evaluated, rtol: float = 0.0, ridge: float = RIDGE
+    ) -> Iterate | None:
+        """As `Solve`. Open contacts, D = 0, are known at once and leave the system. Where D = I, in
+        stick or in contact without friction, its rows are those of rho Q.
+        """
+        (k, d), V, dr = at.error.shape, equations.V, at.error.ravel().copy()
+        kept = np.repeat(at.D.reshape(k, d * d).any(axis=1), d)
+        p = len(at.balance)
+        if not kept.any():
+            return None if p else (dr.reshape(k, d), at.balance)
         rows, gone = np.flatnonzero(kept), np.where(kept, 0.0, dr)
-        n, p = len(rows), len(balance)
-        if n + p == 0:
-            return dr.reshape(k, d), np.zeros(p)
-        scaled = self.rho[:, None, None] * D
-        matrix = assembled(self.Q, scaled, np.eye(d) - D + (self.weight + ridge) * scaled, kept)
+        scaled = equations.rho[:, None, None] * at.D
+        added = np.eye(d) - at.D + (equations.weight + ridge) * scaled
         right = dr[rows]
         if gone.any():  # what the open contacts lose moves the others
-            right -= (scaled @ (self.Q @ gone).reshape(k, d, 1)).ravel()[rows]
-        if p:
-            moved = (scaled @ self.V.reshape(k, d, p)).reshape(k * d, p)[rows]
-            matrix = np.block([[matrix, moved], [self.V[rows].T, np.zeros((p, p))]])
-            right = np.concatenate([right, -balance - self.V.T @ gone])
-        factors = factorised(matrix)
-        if factors is None:
+            right -= (scaled @ (equations.Q @ gone).reshape(k, d, 1)).ravel()[rows]
+        left = (scaled @ V.reshape(k, d, p)).reshape(k * d, p)[rows]
+        border = V[rows], left, -at.balance - V.T @ gone
+        answer = self.matrix.solve(scaled, added, kept, right, border, bool(equations.weight))
+        if answer is None:
             return None
-        x = factors(right)
-        if not np.isfinite(x).all():
-            return None
-        dr[rows] = x[:n]
-        return dr.reshape(k, d), x[n:]
+        dr[rows] = answer[0]
+        return dr.reshape(k, d), answer[1]
 
 
 def crossover(
@@ -168,15 +211,12 @@ def _improve(
     """The residual and the point of the best Newton iterate from (r, multipliers)."""
     r = equations.project(r)[0]
     best = (np.inf, r, multipliers)
-    for _ in range(steps):
-        check_time()
-        residual, error, balance, D = equations.evaluate(r, multipliers)
-        if residual < best[0]:
-            best = (residual, r, multipliers)
-        if residual <= GOOD * max(1.0, float(np.linalg.norm(r))) or residual > 1e6 * best[0]:
+    system = Steps(equations, Factored(block_matrix(equations.Q, r.shape[1])))
+    iterates = newton_iterates(system, system.evaluate((r, multipliers)))
+    for at in islice(iterates, steps):
+        if at.residual < best[0]:
+            best = (at.residual, *at.point)
+        size = max(1.0, float(np.linalg.norm(at.point[0])))
+        if at.residual <= GOOD * size or at.residual > 1e6 * best[0]:
             break
-        change = equations.step(error, balance, D)
-        if change is None:
-            break
-        r, multipliers = r + change[0], multipliers + change[1]
     return best

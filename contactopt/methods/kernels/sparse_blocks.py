@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.linalg import splu
 
-from contactopt.linear.operators import Interface
+from contactopt.linear.operators import Interface, form
 from contactopt.methods.constants import FULL, SMALL
 
 # A diagonal entry this much smaller than the largest of its column is still a pivot: other pivots
@@ -25,6 +25,8 @@ PIVOT = 1e-4
 
 # a factorised block system: right-hand sides (m, j) -> x (m, j)
 Solver: TypeAlias = Callable[[np.ndarray], np.ndarray]
+# V (m, p), B (m, p) and balance (p,) of a bordered system
+Border: TypeAlias = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def assembled(
@@ -54,17 +56,63 @@ def factorised(A: np.ndarray) -> Solver | None:
     return lambda right: np.asarray(dgetrs(lu, swapped, right, trans=1)[0])
 
 
-class DenseBlocks:
-    """Q (n, n) as an array, blocks of d."""
+class Blocks:
+    """Q (n, n) in blocks of d."""
 
-    def __init__(self, Q: np.ndarray, d: int):
-        self.Q, self.d = Q, d
+    Q: Interface
+    d: int
 
     def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
         """Solver of the rows and columns `kept` (n,) of diag(left) Q + diag(added), whose blocks
         are (k, d, d); None if singular. left None stands for the identity.
         """
+        raise NotImplementedError
+
+    def solve(
+        self,
+        left: np.ndarray,
+        added: np.ndarray,
+        kept: np.ndarray,
+        right: np.ndarray,
+        border: Border,
+        regular: bool,
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """x (m,) and lambda (p,) of A x + B lambda = right (m,), V' x = balance (p,), where A is
+        the system of `factor` and `border` is V, B, balance; None if singular. Where A is `regular`
+        lambda need not be unique.
+        """
+        solver = self.factor(left, added, kept)
+        return None if solver is None else bordered(solver, right, *border)
+
+
+class DenseBlocks(Blocks):
+    """Q as an array."""
+
+    def __init__(self, Q: np.ndarray, d: int):
+        self.Q, self.d = Q, d
+
+    def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
         return factorised(assembled(self.Q, left, added, kept))
+
+    def solve(
+        self,
+        left: np.ndarray,
+        added: np.ndarray,
+        kept: np.ndarray,
+        right: np.ndarray,
+        border: Border,
+        regular: bool,
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        V, B, balance = border
+        p = len(balance)
+        if regular or not p:
+            return super().solve(left, added, kept, right, border, regular)
+        A = assembled(self.Q, left, added, kept)
+        solver = factorised(np.block([[A, B], [V.T, np.zeros((p, p))]]))
+        if solver is None:
+            return None
+        x = solver(np.concatenate([right, balance]))
+        return (x[:-p], x[-p:]) if np.isfinite(x).all() else None
 
 
 def blocks_of(Q: sp.csr_array, d: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -80,7 +128,7 @@ def blocks_of(Q: sp.csr_array, d: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return unique // len(own), unique % len(own), blocks, where[len(rows) :]
 
 
-class SparseBlocks:
+class SparseBlocks(Blocks):
     """Q (n, n) by its d x d blocks, with the places of their entries in the columns of an LU
     factorisation.
 
@@ -117,7 +165,6 @@ class SparseBlocks:
         return np.argsort(place), sp.csr_array((numbers, (row, column)), shape=(n, n)).tocsc()
 
     def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
-        """As DenseBlocks.factor."""
         blocks = self.blocks.copy() if left is None else left[self.rows] @ self.blocks
         blocks[self.home] += added
         # Take the entries by columns, and leave out the unknowns that are not kept.
@@ -147,12 +194,9 @@ class SparseBlocks:
         return solve
 
 
-Blocks = DenseBlocks | SparseBlocks
-
-
 def block_matrix(Q: Interface, d: int) -> Blocks:
     """Q in blocks of d components for block systems, sparse where that beats LAPACK on an array."""
-    if not sp.issparse(Q):
+    if form(Q) != "sparse":
         return DenseBlocks(Q, d)
     n = Q.shape[0]
     return DenseBlocks(Q.toarray(), d) if n <= SMALL or Q.nnz > FULL * n * n else SparseBlocks(Q, d)

@@ -5,14 +5,16 @@ the other as it is given. Each step is one PCG of contactopt.methods.kernels.kry
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 
 from contactopt.errors import BackendError
-from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import diagonal
 from contactopt.methods import constants
-from contactopt.methods.kernels.krylov import krylov_step
-from contactopt.methods.kernels.semismooth import Equations, Projection
+from contactopt.methods.kernels.krylov import Krylov
+from contactopt.methods.kernels.loop import newton_iterates
+from contactopt.methods.kernels.semismooth import Equations, Evaluated, Projection, Steps
 from contactopt.methods.method import Iterate
 from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
@@ -72,19 +74,19 @@ class KrylovSubproblem:
     ) -> tuple[float, Iterate]:
         """The best of ACTIVE_SETS Newton iterates, and its residual."""
         best, point, last = np.inf, (r, lam), np.inf
-        for _ in range(constants.ACTIVE_SETS):
-            check_time()
-            residual, error, balance, D = equations.evaluate(r, lam)
-            if residual < best:
-                best, point = residual, (r, lam)
-            size = max(1.0, float(np.linalg.norm(r)))
-            if residual <= EXACT * size:
+
+        def accuracy(at: Evaluated) -> float:
+            nonlocal last
+            falls, last = min(0.1 * EXACT * size / at.residual, at.residual / last), at.residual
+            return min(1e-2, max(1e-8, falls))
+
+        system = Steps(equations, Krylov(self.P), accuracy)
+        for at in islice(newton_iterates(system, system.evaluate(point)), constants.ACTIVE_SETS):
+            if at.residual < best:
+                best, point = at.residual, at.point
+            size = max(1.0, float(np.linalg.norm(at.point[0])))
+            if at.residual <= EXACT * size:
                 break
-            rtol = min(1e-2, max(1e-8, min(0.1 * EXACT * size / residual, residual / last)))
-            step = krylov_step(equations, self.P, error, balance, D, rtol)
-            if step is None:
-                break
-            r, lam, last = r + step[0], lam + step[1], residual
         return best, point
 
     def _glued(self, r: np.ndarray, lam: np.ndarray, equations: Equations) -> Iterate:
@@ -95,7 +97,7 @@ class KrylovSubproblem:
         u = equations.displacements(r, lam)[:, self.own]
         error[:, self.own] = -equations.rho[:, None] * u
         balance = equations.V.T @ r.ravel() + equations.s
-        step = krylov_step(equations, self.P, error, balance, D, 1e-2)
+        step = Krylov(self.P)(equations, Evaluated((r, lam), np.inf, error, balance, D), 1e-2)
         return (r, lam) if step is None else (r + step[0], lam + step[1])
 
     def _projection(self, given: np.ndarray) -> Projection:
