@@ -1,17 +1,15 @@
 """Loads: a pressure against Lame's solutions and on closed surfaces, and what each load answers."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
 
 import contactopt
-from contactopt import InputError, Material, Part, Plate, Pressure, Rigid, Scene, Support, Traction
+from contactopt import InputError, Material, Part, Pressure, Rigid, Scene, Support, Traction
 from contactopt.bodies.body import build_body
 from contactopt.figures.check_page import _normals
-from contactopt.scenes import loads, make_scene
-from contactopt.scenes.loads.load import Load
 from contactopt.scenes.parameters import parameter
 from contactopt.scenes.scene_files import read_scene_file
 from contactopt.simplification.search import simplify
@@ -161,27 +159,3 @@ def test_arrows_of_check_are_normal_to_the_boundary():
     mesh = ring(IN, OUT, 3, 24)
     x, n = _normals(mesh, mesh.boundaries["inside"])
     assert np.all(np.sum(n * x, axis=0) < -0.98 * IN)
-
-
-@dataclass(frozen=True)
-class Water(Pressure):
-    """Pressure that grows with the depth below a level: a kind of load in one file and one row."""
-
-    what = "water"
-    form = "water:BODY:BOUNDARY"
-
-    def density(self, x, n):
-        return -self.pressure * np.maximum(1.0 - x[-1], 0.0) * n
-
-
-def test_a_new_load_is_one_class():
-    assert issubclass(Water, Load) and set(loads.LOADS) >= {"tractions", "plates", "pressures"}
-    sides = (Water("x-", 2.0), Plate("top", {"y": -1.0}))
-    own = body(
-        block(()).upper.mesh.with_boundaries({"contact": lambda x: x[1] == 0}),
-        sides,
-        "plane-strain",
-    )
-    assert abs(own.load[own.unknowns][0].sum() - 1.0) < 1e-14  # int 2 (1 - y) dy
-    assert contactopt.run(block(sides)).solution.solved
-    assert make_scene("punch-2d").upper.loads[0].words(("x", "y")).startswith("plate on 'top'")
