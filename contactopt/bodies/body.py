@@ -22,6 +22,7 @@ from contactopt.bodies.elements import (
     make_basis,
     node_unknowns,
     nodes_on,
+    traction_load,
     weight_at,
 )
 from contactopt.bodies.motions import check_free, free_motions
@@ -194,13 +195,15 @@ def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:
         if isinstance(load, Plate):
             continue
         value = np.asarray(load.value, dtype=float)
+        if isinstance(load, Traction):
+            total += traction_load(basis, basis.mesh.boundaries[load.boundary], value, weight)
+            continue
 
         @skfem.LinearForm
         def form(v, w, value=value):  # type: ignore[no-untyped-def]
             return dot(value.reshape((-1, 1, 1)) * np.ones_like(v), v) * weight_at(weight, w.x)
 
-        where = basis.boundary(load.boundary) if isinstance(load, Traction) else basis
-        total += form.assemble(where)
+        total += form.assemble(basis)
     return total
 
 

@@ -58,6 +58,7 @@ TIED = {
     "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]]),
 }
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
+SMOOTH = 6  # order of the quadrature of a load on curved faces
 NOISE = 1e-14  # what rounding leaves of a zero
 
 
@@ -246,6 +247,19 @@ def opposed(place: np.ndarray) -> str:
         f"facets face opposite ways at ({text(place)}), so that the boundary has no"
         " normal there; make a boundary of each side, with a contact of its own."
     )
+
+
+def traction_load(
+    basis: skfem.CellBasis, boundary: np.ndarray, value: np.ndarray, weight: Weight
+) -> np.ndarray:
+    """The forces (N,) on the unknowns of a traction (dim,) on facets (f,)."""
+    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], SMOOTH)
+    at = Faces(basis.mesh, np.asarray(boundary), points)
+    measure = at.scale * share * weight_at(weight, at.places)
+    forces = np.einsum("fiq,fq->if", at.values(basis.elem.elem), measure)
+    dofs = basis.element_dofs[:, at.owner].reshape(len(forces), len(value), -1)
+    every = forces[:, None] * value[:, None]  # shape function, component, facet
+    return np.bincount(dofs.ravel(), every.ravel(), minlength=basis.N)
 
 
 def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:
