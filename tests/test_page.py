@@ -311,6 +311,7 @@ def test_bodies_and_colours_are_on_the_canvas_at_once(folder, name, width):
         assert browser.ask(UNCUT) > 5
         assert browser.ask("draws") == 1  # what nobody asked to be drawn again is not
         assert browser.ask(CUT) == []
+        assert browser.ask("[1200, 0.12345, 2e-9].map(number)") == ["1200", "0.1235", "2e-9"]
         opened, scale = browser.ask(SAME), browser.ask("painter.scale")
         browser.press("b")
         assert scale > browser.ask("painter.scale")  # the contact is enlarged

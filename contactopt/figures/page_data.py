@@ -33,6 +33,7 @@ NEAREST = 16  # how many times as large as the picture of a contact the bodies m
 TURNS = 0.5  # length of the mean of unit normals below which a surface goes around something
 # cosine of the angle between two faces from which on their edge is drawn
 SHARP = np.cos(np.deg2rad(30))
+ROUNDING = 1e-12  # of a surface, below which a gap or a slip is what rounding leaves of zero
 ON_PLANE = 1e-9  # of the size of a body, within which a node lies in a plane of symmetry
 # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut
 MOST_INSIDE = 40_000
@@ -91,7 +92,9 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "contacts": contacts,
         "states": 1 if path is None else len(path["reactions"]),
         "moving": moving,
-        "history": None if path is None else _history(folder / "history.csv"),
+        "history": None if path is None else (history := _history(folder / "history.csv")),
+        "columns": {} if path is None else {name: _column(name, summary) for name in history},
+        "first": int(np.argmax([own["peak"] for own in contacts])),
     }
 
 
@@ -252,7 +255,7 @@ def _contact(
     pressure, normals = (mesh.point_data[f"contact_{key}"] for key in ("pressure", "normal"))
     weights = pressure.clip(0) if np.any(pressure > 0) else np.ones(len(pressure))
     mean = np.average(normals, axis=0, weights=weights)
-    size = float(np.linalg.norm(mean))
+    size, extent = float(np.linalg.norm(mean)), float(np.ptp(mesh.points, axis=0).max())
     states = _last_state(mesh, interface, own) if path is None else _contact_states(path, own)
     return {
         "points": packed(mesh.points),
@@ -263,8 +266,18 @@ def _contact(
         "normal": (mean / size).tolist() if size > TURNS else None,
         "peak": float(pressure.max(initial=0.0)),
         "place": packed(interface["x"][own].T),
-        "states": {name: packed(np.nan_to_num(value)) for name, value in states.items()},
+        "states": {
+            name: packed(
+                _rounded(value, extent) if name in ("gap", "slip") else np.nan_to_num(value)
+            )
+            for name, value in states.items()
+        },
     }
+
+
+def _rounded(lengths: np.ndarray, extent: float) -> np.ndarray:
+    """Lengths without what rounding leaves of zero."""
+    return np.where(np.abs(np.nan_to_num(lengths)) > ROUNDING * extent, lengths, 0.0)
 
 
 def _last_state(mesh: Any, interface: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:
@@ -304,6 +317,15 @@ def _history(file: Path) -> dict[str, list[float]]:
     with open(file, newline="") as table:
         rows = list(csv.DictReader(table))
     return {key: found for key in rows[0] if (found := _numbers([row[key] for row in rows]))}
+
+
+def _column(name: str, summary: dict[str, Any]) -> str:
+    """The name of a column of the history, with its unit."""
+    length, force = summary["units"][0], force_unit(summary["units"])
+    units = {"seconds": "s"} | {f"{side}_force": force for side in ("normal", "shear")}
+    units |= dict.fromkeys(("approach", "shift", "contact_half_width", "stick_half_width"), length)
+    unit = f"{force} {length}" if name.endswith(("energy", "work")) else units.get(name, "")
+    return name.replace("_", " ") + (f" [{unit}]" if unit and "[" not in name else "")
 
 
 def _numbers(texts: list[str]) -> list[float]:

@@ -4,7 +4,7 @@ space.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_zone, is_level, stick_width
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.kinds import KINDS
-from contactopt.scenes.scene import BodyForce, Traction
+from contactopt.scenes.loads import Load
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
@@ -162,11 +162,10 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     return found
 
 
-def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]]:
+def _prescribed(item: Any, axes: tuple[str, ...]) -> dict[str, Mapping[str, float]]:
     """What a support, a load or a rigid body prescribes: kind -> component -> value."""
-    if isinstance(item, Traction | BodyForce):
-        kind = "traction" if isinstance(item, Traction) else "weight"
-        return {kind: dict(zip(axes, item.value))}
+    if isinstance(item, Load):
+        return {item.form.partition(":")[0]: item.values(axes)}
     kinds = ("force", "displacement")
     return {kind: given for kind in kinds if (given := getattr(item, kind, None))}
 

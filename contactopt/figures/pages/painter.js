@@ -1,8 +1,7 @@
-// A picture of triangles, lines and dots in a canvas, with a depth buffer of its own. It asks no graphics card, so that every browser shows the same.
+// A picture of triangles, lines and dots in a canvas, with a depth buffer of its own.
 const PALETTES = {
   heat: ["f3ece0", "fdd8a8", "fdbb84", "fc8d59", "ef6548", "d7301f", "b30000", "7f0000"],
   viridis: ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"],
-  cividis: ["00224e", "123570", "3b496c", "575d6d", "707173", "8a8678", "a59c74", "c3b369", "e1cc55", "fee838"],
 };
 
 function palette(colours, bands = false) {  // 256 colours as bytes, between the given ones or in bands
@@ -13,12 +12,12 @@ function palette(colours, bands = false) {  // 256 colours as bytes, between the
   });
 }
 
-const MOST_PIXELS = 1.2e7;  // that are painted for one picture, 150 MB
+const MOST_PIXELS = 1.2e7;  // of one picture, 150 MB
 
 class Painter {
   constructor(canvas) { this.canvas = canvas; this.context = canvas.getContext("2d", {willReadFrequently: true}); }
 
-  wanted(moving) {  // pixels of the canvas per pixel of the page, and painted ones per pixel of the canvas, whose means are shown: 1 while it moves
+  wanted(moving) {  // canvas per page pixel; painted per canvas pixel, whose means are shown; the size
     const ratio = moving ? 1 : Math.min(window.devicePixelRatio || 1, 2), size = [this.canvas.clientWidth, this.canvas.clientHeight].map((length) => Math.max(1, Math.round(length * ratio)));
     return [ratio, moving || 4 * size[0] * size[1] > MOST_PIXELS ? 1 : 2, ...size];
   }
@@ -143,20 +142,21 @@ class Painter {
     this.context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
   }
 
-  text(words, x, y, align = "center", halo = true) {
+  text(words, x, y, align = "center") {
     const {context} = this;
     Object.assign(context, {font: "12px -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif", textAlign: align, textBaseline: "middle", fillStyle: "#1b1b1b", strokeStyle: "#fff", lineWidth: 3});
     const wide = context.measureText(words).width, before = wide * {left: 0, center: 0.5, right: 1}[align];  // no word is cut
     x = Math.max(before + 2, Math.min(this.width / this.dense - 2 - wide + before, x));
-    if (halo) context.strokeText(words, x, y);
+    context.strokeText(words, x, y);
     context.fillText(words, x, y);
   }
 
-  stroke(points, colour, width) {
+  stroke(points, colour, width, fill = "") {
     const {context} = this;
     Object.assign(context, {strokeStyle: colour, lineWidth: width, lineCap: "round"});
     context.beginPath();
     points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
+    if (fill) { context.fillStyle = fill; context.fill(); }
     context.stroke();
   }
 
