@@ -97,7 +97,8 @@ def __getattr__(name: str) -> Any:
         return import_module(f"contactopt.{_MODULES[name]}")
     for module, names in _HOMES.items():
         if name in names.split():
-            return getattr(import_module(f"contactopt.{module}"), name)
+            value = globals()[name] = getattr(import_module(f"contactopt.{module}"), name)
+            return value
     raise AttributeError(f"module 'contactopt' has no attribute {name!r}")
 
 

@@ -116,7 +116,7 @@ def solve(
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
         remark(problem, solution)
-    return replace(solution, notes=tuple(notes))
+    return replace(solution, notes=tuple(notes)) if notes else solution
 
 
 def _method_for(
