@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
-from contactopt.bodies.motions import kernel, whole_motions
+from contactopt.bodies.motions import kernel, whole_motions, work
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import count
 from contactopt.checks import overheard
@@ -132,7 +132,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
         at_rest=np.zeros(len(R)),
         motions=Z,
         motion_names=names,
-        resultants=Z.T @ body.load + (mean @ Z).T @ body.plate_forces,
+        resultants=work(Z, body.load) + (mean @ Z).T @ body.plate_forces,
     )
 
 
