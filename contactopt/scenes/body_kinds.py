@@ -12,14 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_name, check_number, real_array, short
+from contactopt.checks import check_name, check_number, check_size, real_array, short
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.meshes.given_curves import Curve
 from contactopt.scenes.kinds import KINDS
 
-# of forces, stresses and lengths: squares of larger and of smaller ones are lost to floating point
-LARGEST_VALUE, SMALLEST_VALUE = 1e100, 1e-150
 Function = Callable[[np.ndarray], np.ndarray]
 
 
@@ -132,7 +130,7 @@ class Part:
                 needs = f"a {what} needs a tuple of {len(components)} values"
                 raise self._wrong(f"{needs} ({', '.join(components)})", short(value))
             for one in value:
-                _check_value(f"every {what} value of body '{self.name}'", one)
+                check_size(f"every {what} value of body '{self.name}'", one)
 
     @property
     def given(self) -> bool:
@@ -317,13 +315,4 @@ def check_components(body: str, values: Mapping[str, float], kind: str) -> None:
                 f"body '{body}': there is no component {component!r}; use {', '.join(components)},"
                 f" which are those of kind {kind!r}{remedy}."
             )
-        _check_value(f"the {component} value of body '{body}'", value)
-
-
-def _check_value(what: str, value: float) -> None:
-    check_number(what, value, -LARGEST_VALUE, LARGEST_VALUE)
-    if 0 < abs(value) < SMALLEST_VALUE:
-        raise InputError(
-            f"{what} is {value:g}, which is too small: write 0, or take units in which it is larger"
-            f" than {SMALLEST_VALUE:g}."
-        )
+        check_size(f"the {component} value of body '{body}'", value)
