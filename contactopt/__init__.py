@@ -23,8 +23,10 @@ if TYPE_CHECKING:
     from contactopt.derivatives.gradient import gradient
     from contactopt.derivatives.interface import sensitivity
     from contactopt.errors import BackendError, InputError
+    from contactopt.holding import Limit, limit
     from contactopt.material import Material
     from contactopt.meshes.mesh_files import load_mesh
+    from contactopt.methods.batch import solve_batch
     from contactopt.methods.diagnosis import Diagnosis, diagnose
     from contactopt.methods.driver import solve
     from contactopt.methods.enumeration import all_solutions
@@ -61,8 +63,10 @@ _HOMES = {
     "derivatives.gradient": "gradient",
     "derivatives.interface": "sensitivity",
     "errors": "BackendError InputError",
+    "holding": "Limit limit",
     "material": "Material",
     "meshes.mesh_files": "load_mesh",
+    "methods.batch": "solve_batch",
     "methods.diagnosis": "Diagnosis diagnose",
     "methods.driver": "solve",
     "methods.enumeration": "all_solutions",
@@ -93,7 +97,8 @@ def __getattr__(name: str) -> Any:
         return import_module(f"contactopt.{_MODULES[name]}")
     for module, names in _HOMES.items():
         if name in names.split():
-            return getattr(import_module(f"contactopt.{module}"), name)
+            value = globals()[name] = getattr(import_module(f"contactopt.{module}"), name)
+            return value
     raise AttributeError(f"module 'contactopt' has no attribute {name!r}")
 
 

@@ -132,7 +132,7 @@ def real_array(name: str, value: Any) -> np.ndarray:
             f"{name} must be an array of numbers; got {type(value).__name__} of {array.dtype}."
         )
     numbers = np.array(array, dtype=float)
-    if not np.all(np.isfinite(numbers)):
+    if not np.isfinite(numbers).all():
         raise InputError(f"{name} holds a number that is not finite.")
     return numbers
 

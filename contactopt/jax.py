@@ -8,9 +8,10 @@
     >>> pressure = quantity("punch-2d", "pressure", ["mu", "E:punch"])
     >>> jax.value_and_grad(pressure)(jax.numpy.array([0.3, 5.0]))
 
-The problems are solved outside of JAX, one after the other under `vmap`. The derivative of `solve`
-is the linear system of contactopt.derivatives, with the matrix of Newton's last step, whose factors
-come with the solution; that of `quantity` is contactopt.gradient. So jax.jvp, jax.vjp, jax.grad,
+The problems are solved outside of JAX, those of one `vmap` at once (contactopt.solve_batch). The
+derivative of `solve` is the linear system of contactopt.derivatives, with the matrix of Newton's
+last step, whose factors come with the solution; that of `quantity` is contactopt.gradient.
+So jax.jvp, jax.vjp, jax.grad,
 jax.jacfwd and jax.jacrev all work. There are no second derivatives.
 
 Where a contact is on the edge between open and closed, or stick and slip, a solution has one-sided
@@ -24,6 +25,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,7 @@ from contactopt.derivatives.gradient import gradient
 from contactopt.derivatives.interface import Sensitivity, told_apart
 from contactopt.derivatives.states import chain_of
 from contactopt.errors import InputError
+from contactopt.methods.batch import problems_of, solve_all
 from contactopt.methods.driver import solve as solve_problem
 from contactopt.problem import InterfaceProblem
 from contactopt.readings.quantities import seeds_of
@@ -84,25 +87,43 @@ def solve(
 def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
     """The function of Q, q, mu, V and s, made once so that JAX traces it once."""
 
-    def found(data: Any) -> Sensitivity:
-        Q, q, mu, V, s = (np.asarray(array) for array in data)
-        problem = InterfaceProblem(Q, q, mu=mu, V=V, s=s)
-        solution = solve_problem(problem, tol=tol, **settings)
-        if not solution.solved:
-            raise InputError(f"no certified solution was found: {solution.status}.")
-        return Sensitivity(problem, solution, told_apart(solution.residual))
+    def found(data: Any) -> list[Sensitivity]:
+        """One problem, or many under `vmap`, which puts axes before those of each array."""
+        before = np.shape(data[1])[:-2]
+        shapes = [(prod(before), *np.shape(array)[len(before) :]) for array in data]
+        Q, q, mu, V, s = (np.reshape(array, shape) for array, shape in zip(data, shapes))
+        if s.size:
+            given = zip(Q, q, mu, V, s)
+            problems = [InterfaceProblem(Q, q, mu, V, s) for Q, q, mu, V, s in given]
+        else:
+            problems = problems_of(Q, q, mu)
+        if len(problems) > 1 and not (s.size or settings):
+            solutions = solve_all(problems, tol)
+        else:
+            solutions = [solve_problem(problem, tol=tol, **settings) for problem in problems]
+        for solution in solutions:
+            if not solution.solved:
+                raise InputError(f"no certified solution was found: {solution.status}.")
+        return [Sensitivity(p, x, told_apart(x.residual)) for p, x in zip(problems, solutions)]
+
+    def shaped(results: list[Arrays], data: Any) -> Arrays:
+        before = np.shape(data[1])[:-2]
+        return tuple(np.reshape(parts, (*before, *np.shape(parts[0]))) for parts in zip(*results))
 
     def solved(*data: Any) -> Arrays:
-        at = found(data).solution
-        return at.reactions, at.multipliers
+        points = [(at.solution.reactions, at.solution.multipliers) for at in found(data)]
+        return shaped(points, data)
 
     def linearised(*data: Any) -> Arrays:
-        at = _smooth(found(data))
-        tangent, by_mu = at.tangent, np.broadcast_to(at.by_parameter, at.problem.q.shape)
-        whole = tangent.factors.whole
-        if not whole.unique:
-            warnings.warn(UNDETERMINED, stacklevel=2)
-        return at.solution.reactions, at.solution.multipliers, tangent.rho, tangent.D, by_mu, *whole
+        results: list[Arrays] = []
+        for at in map(_smooth, found(data)):
+            tangent, by_mu = at.tangent, np.broadcast_to(at.by_parameter, at.problem.q.shape)
+            whole = tangent.factors.whole
+            if not whole.unique:
+                warnings.warn(UNDETERMINED, stacklevel=2)
+            point = at.solution.reactions, at.solution.multipliers
+            results.append((*point, tangent.rho, tangent.D, by_mu, *whole))
+        return shaped(results, data)
 
     def rule(data: Any, changes: Any) -> Any:
         _, q, mu, _, s = data
@@ -110,10 +131,10 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
         numbers = jnp.zeros(m, int)
         whole = jnp.zeros((m, m)), numbers, numbers, jnp.zeros((2, m)), jnp.array(True)
         like = q, s, mu, jnp.zeros((k, d, d)), q, *whole
-        r, lam, *linear = _outside(linearised, like, "sequential", *data)
+        r, lam, *linear = _outside(linearised, like, "broadcast_all", *data)
         return (r, lam), _change(data, changes, r, lam, *linear)
 
-    act = jax.custom_jvp(lambda *data: _outside(solved, (data[1], data[4]), "sequential", *data))
+    act = jax.custom_jvp(lambda *data: _outside(solved, (data[1], data[4]), "broadcast_all", *data))
     act.defjvp(rule)
     return jax.jit(act)
 

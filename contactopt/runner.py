@@ -18,7 +18,7 @@ from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, not_drawable, write
 from contactopt.figures.style import FORMATS
 from contactopt.files.writing import check_folder, finite, whole_folder
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import has_entries
 from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.methods.notes import collected
@@ -338,7 +338,7 @@ def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
         **{key: first[key] if single else None for key in WIDTHS},
         "max_pressure": largest,
         "pressure": None if peak is None else peak.value,
-        "q": "implicit" if isinstance(problem.Q, InterfaceOperator) else "explicit",
+        "q": "implicit" if not has_entries(problem.Q) else "explicit",
         "products": solution.products,
         "remarks": [*said, *more],
         **found,

@@ -1,5 +1,6 @@
 """Data flows one way, and what is heavy waits until it is used."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -20,3 +21,18 @@ def test_heavy_imports_wait_until_they_are_used():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_few_ask_for_the_type_of_q():
+    """Everyone else asks contactopt.linear.operators for the form of Q, or for what it does."""
+    asked = re.compile(r"isinstance\([\w.]*\bQ, \(?(InterfaceOperator|Convolution|np\.ndarray)")
+    files = [p for p in (ROOT / "contactopt").rglob("*.py") if asked.search(p.read_text())]
+    assert {file.name for file in files} <= {"operators.py", "interface_problem.py"}
+
+
+def test_newton_steps_are_added_in_one_place():
+    """A step is taken in kernels/loop.py; other files evaluate equations, or solve for a step."""
+    taken = re.compile(r"system\.change\(")
+    kernels = ROOT / "contactopt" / "methods"
+    files = {path.name for path in kernels.rglob("*.py") if taken.search(path.read_text())}
+    assert files == {"loop.py"}

@@ -203,3 +203,37 @@ def test_damaged_files_are_told(tmp_path):
     for name, words in (("bad.step", "cannot be read"), ("none.step", "does not exist")):
         with pytest.raises(InputError, match=words):
             mesh_part(tmp_path / name, tmp_path / "out.msh")
+
+
+@pytest.mark.parametrize(
+    ("place", "near"),
+    [
+        ("2,2,2", lambda x: np.linalg.norm(x - 2.0, axis=0)),
+        ("cylinder1/y-", lambda x: np.hypot(np.hypot(x[0] - 1, x[2] - 1) - 0.5, x[1])),
+        ("radius=0.5", lambda x: np.abs(np.hypot(x[0] - 1, x[2] - 1) - 0.5)),
+    ],
+)
+def test_elements_are_fine_at_a_point_an_edge_or_a_radius(parts, place, near):
+    """The edges there are as long as asked for, and those far from it are not."""
+    out = Path("parts.msh")
+    mesh_part(parts, out, 0.8, {place: 0.1}, order=1)
+    mesh = load_bodies(out)[0]["body1"]
+    ends = mesh.p[:, mesh.edges]
+    long, away = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=0), near(ends.mean(axis=1))
+    assert long[away < 0.1].mean() < 0.17
+    assert long[away > 0.9].mean() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("place", "said"),
+    [
+        ("9,0,0", "lies outside"),
+        ("radius=3", "its radii are 0.5"),
+        ("radius=x", "a radius is a number"),
+        ("x-/x+", "do not meet"),
+        ("1,2,e", "a point is given as X,Y,Z"),
+    ],
+)
+def test_places_that_are_not_there_are_refused(parts, place, said):
+    with pytest.raises(InputError, match=said):
+        mesh_part(parts, Path("parts.msh"), 0.8, {place: 0.1})

@@ -111,6 +111,15 @@ def test_the_page_shows_boundaries_loads_and_gaps(tmp_path):
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert np.linalg.norm(area, axis=1).sum() / 2 == pytest.approx(400.0)
     assert data["roles"] == list(ROLES)
+    shown = {name: decoded(item["states"]["status"]).sum() for name, item in items.items()}
+    assert shown["punch-foundation"] == 3, "a dozen normals on four images"
+    bottom = items["foundation: bottom (support)"]["states"]
+    held = decoded(bottom["held"])[decoded(bottom["status"]) > 0]
+    assert len(held) == 5 and np.all(held == [0, 0, -2]), "clamped, from below"
+    symmetric = [item["hidden"] for name, item in items.items() if "symmetry" in name]
+    assert symmetric and all(symmetric), "planes of symmetry, which the whole does not have"
+    page = (tmp_path / "page.html").read_text()
+    assert page.index("pair &#x27;punch-foundation&#x27;") < page.index("body &#x27;punch&#x27;")
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no browser")

@@ -137,7 +137,8 @@ from contactopt.cli import main
 assert main(["mesh", "box.step", "--out", "box.msh"]) == 0
 """,
 }
-INTO_DOCS = ("experiments", "reports", "README.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE")
+INTO_DOCS = ("experiments", "reports", "pyproject.toml", "LICENSE")
+INTO_DOCS += ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 
 
 @pytest.mark.slow

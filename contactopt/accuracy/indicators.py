@@ -19,7 +19,6 @@ from contactopt.errors import InputError
 from contactopt.readings.corners import infinite
 from contactopt.readings.quantities import Quantity, find_quantity
 from contactopt.readings.state import State
-from contactopt.scenes.scene import BodyForce
 from contactopt.solving.solve_scene import Solved
 
 log = logging.getLogger(__name__)
@@ -142,7 +141,7 @@ def _of_shape(
     """What volumes (elements,) between facets and their curves add to the error."""
     if not np.any(volume):
         return np.zeros(len(volume))
-    forces = [np.asarray(own.value) for own in part.loads if isinstance(own, BodyForce)]
+    forces = [np.asarray(own.value) for own in part.loads if not own.boundary]
     load = np.sum([np.zeros(dim), *forces], axis=0)
     (work,) = body.added_work(volume, load, U, W)
     (energy,) = body.added_work(volume, 0 * load, U, U)

@@ -24,7 +24,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.errors import InputError
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import form, has_entries
 from contactopt.problem import InterfaceProblem, Status, dimensionless
 
 FIND_LIMIT = 60.0  # s for a Python to import the solver
@@ -130,7 +130,7 @@ class Peer:
             raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")
         if problem.dim not in dims and 3 not in dims:
             raise InputError(f"this solver of {self.name} is one of the plane.")
-        if isinstance(problem.Q, InterfaceOperator):
+        if not has_entries(problem.Q):
             problem = problem.explicit()
         p, scales = dimensionless(problem)
         if problem.dim not in dims:
@@ -201,7 +201,7 @@ def _in_space(problem: InterfaceProblem) -> InterfaceProblem:
     order = order.ravel()
     wide = (
         sp.csr_array(sp.block_diag([Q, new]))[order][:, order]
-        if sp.issparse(Q)
+        if form(Q) == "sparse"
         else la.block_diag(Q, new.toarray())[np.ix_(order, order)]
     )
     q = np.column_stack([problem.q, np.zeros(k)])

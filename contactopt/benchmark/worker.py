@@ -26,8 +26,7 @@ from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.store import STATUSES
 from contactopt.errors import BackendError, InputError
-from contactopt.linear.convolution import Convolution
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import form, has_entries
 from contactopt.methods import find_method
 from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem, Solution, Status
@@ -71,9 +70,9 @@ def build(
         begin = time.perf_counter()
         problem = spec.build(_kept.plugins.problems)
         seconds = time.perf_counter() - begin
-        if isinstance(problem.Q, InterfaceOperator) and problem.q.size <= MOST_ROWS:
+        if not has_entries(problem.Q) and problem.q.size <= MOST_ROWS:
             problem = problem.explicit()
-        if isinstance(problem.Q, InterfaceOperator) and not isinstance(problem.Q, Convolution):
+        if form(problem.Q) in ("products", "bodies"):
             raise InputError(
                 f"problem '{spec.label}' must have Q as a matrix or as a convolution above"
                 f" {MOST_ROWS} components; a benchmark hands it to other processes."

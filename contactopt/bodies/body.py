@@ -31,7 +31,8 @@ from contactopt.checks import check_size
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
-from contactopt.scenes.scene import Part, Plate, Scene, Traction
+from contactopt.scenes.loads import Load
+from contactopt.scenes.scene import Part, Scene
 
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 
@@ -147,7 +148,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
         )
     known = mesh.boundaries or {}
     names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
-    names += [load.boundary for load in part.loads if isinstance(load, (Traction, Plate))]
+    names += [load.boundary for load in part.loads if load.boundary]
     filled = sorted(boundary for boundary, facets in known.items() if len(facets))
     for name in names:
         if name not in filled:
@@ -195,15 +196,15 @@ def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:
 def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:
     total = np.zeros(basis.N)
     for load in part.loads:
-        if isinstance(load, Plate):
+        if load.level:
             continue
-        value = np.asarray(load.value, dtype=float)
 
         @skfem.LinearForm
-        def form(v, w, value=value):  # type: ignore[no-untyped-def]
-            return dot(value.reshape((-1, 1, 1)) * np.ones_like(v), v) * weight_at(weight, w.x)
+        def form(v, w, load=load):  # type: ignore[no-untyped-def]
+            x = np.asarray(w.x)
+            return dot(load.density(x, w.n if load.boundary else x), v) * weight_at(weight, x)
 
-        where = basis.boundary(load.boundary) if isinstance(load, Traction) else basis
+        where = basis.boundary(load.boundary) if load.boundary else basis
         total += form.assemble(where)
     return total
 
@@ -222,7 +223,7 @@ def _mirrored_nodes(
     names += [
         load.boundary
         for load in part.loads
-        if isinstance(load, Traction) and np.count_nonzero(load.value)
+        if load.boundary and not load.level and any(load.values(scene.components).values())
     ]
     loaded = [np.asarray(mesh.boundaries[name]) for name in names]
     facets = np.setdiff1d(mesh.boundary_facets(), np.concatenate([np.zeros(0, dtype=int), *loaded]))
@@ -292,7 +293,7 @@ class _Constraints:
                 self.prescribed[where] = value
                 self.hold(f"support '{support.boundary}'", where)
 
-    def add_plate(self, plate: Plate) -> None:
+    def add_plate(self, plate: Load) -> None:
         others = self.held.copy()
         for component in self.scene.components:
             where = self.unknowns(plate.boundary, component)
@@ -321,6 +322,6 @@ def _constrained(scene: Scene, part: Part, basis: skfem.CellBasis) -> _Constrain
     made = _Constraints(scene, part, basis, np.zeros(basis.N), np.zeros(basis.N, dtype=bool))
     made.add_supports()
     for load in part.loads:
-        if isinstance(load, Plate):
+        if load.level:
             made.add_plate(load)
     return made

@@ -27,7 +27,6 @@ from contactopt.bounds.simplices import Simplices
 from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved
-from contactopt.scenes.scene import BodyForce, Plate, Traction
 from contactopt.solving.solve_scene import Solved
 
 THIN = 3e4  # length over height: half as much again is past what rounding permits
@@ -111,10 +110,10 @@ class PressedScene:
             )
         part: Any = self.reduction.scene.parts[number]
         holding = [own for own in part.supports if "z" in (own.displacement or ("z",))]
-        plates = [own for own in part.loads if isinstance(own, Plate)]
+        plates = [own for own in part.loads if own.level]
         if self.revolved and plates and len(holding) + len(plates) > 1:
             raise InputError(f"{name}: a bound needs nothing else that holds it beside the plate.")
-        heavy = any(isinstance(own, BodyForce) and own.value[1] for own in part.loads)
+        heavy = any(not own.boundary and own.value[1] for own in part.loads)
         order = 2 if self.revolved and heavy else degree
         return EquilibriumElements(mesh, order, self.revolved, halves.corners)
 
@@ -267,9 +266,9 @@ class PressedScene:
         lever = mesh.p[0, mesh.facets] if self.revolved else np.ones(mesh.facets.shape)
         lever = (lever + lever.sum(axis=0)) / (d + 1)  # with the hat functions
         for load in part.loads:
-            if isinstance(load, Plate):
+            if load.level:
                 holding.append((load.boundary, None if load.glued else load.force))
-            elif isinstance(load, Traction) and loaded:
+            elif load.boundary and loaded:
                 own = np.asarray(mesh.boundaries[load.boundary])
                 size = (areas * lever).T[own, :, None] / d
                 moments[own] += size * np.asarray(load.value, dtype=float)

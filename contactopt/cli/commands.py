@@ -142,6 +142,19 @@ def simplify(options: argparse.Namespace) -> int:
     return 0
 
 
+def limit(options: argparse.Namespace) -> int:
+    """Say at which factor on a load the bodies slide away; the exit code is 1 if it is unknown."""
+    from contactopt.holding import limit
+
+    changes = _arguments_of(options.set)
+    with progress(
+        Path(options.scene).stem, quiet=options.quiet, lines=options.verbose > 0
+    ) as shown:
+        found = limit(options.scene, options.load, note=shown.note, **changes)
+    print(found)
+    return int(found.factor != found.factor)
+
+
 def check(options: argparse.Namespace) -> int:
     """Say what is known of a scene before it is solved, and write it as a page."""
     from contactopt.figures.check_page import write_check_page

@@ -13,7 +13,7 @@ from contactopt.benchmark.keys import help_text
 from contactopt.cli.completion import NAMES
 from contactopt.run_options import OPTIONS
 
-OF_A_SCENE = ("run", "show", "check", "simplify", "export")
+OF_A_SCENE = ("run", "show", "check", "simplify", "export", "limit")
 
 
 def make_parser() -> argparse.ArgumentParser:

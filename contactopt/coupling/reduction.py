@@ -47,6 +47,7 @@ from contactopt.linear.operators import (
     InterfaceOperator,
     check_dense,
     diagonal,
+    has_entries,
 )
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
@@ -117,7 +118,7 @@ class Reduction:
     @property
     def operator(self) -> InterfaceOperator:
         """Q by its products, whatever the form of problem.Q."""
-        if isinstance(self.problem.Q, InterfaceOperator):
+        if not has_entries(self.problem.Q):
             return self.problem.Q
         return operator(self.bodies, self.maps, self.couplings)
 
@@ -167,7 +168,7 @@ class Reduction:
         bodies = _on_ground(self.scene, self.bodies)
         if all(new is old for new, old in zip(bodies, self.bodies)):
             return None
-        implicit = isinstance(self.problem.Q, InterfaceOperator)
+        implicit = not has_entries(self.problem.Q)
         Q = compliance(bodies, self.maps, self.couplings, implicit)
         return replace(self._with(bodies, Q), on_ground=True)
 

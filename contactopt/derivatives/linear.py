@@ -24,12 +24,11 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg as la
-import scipy.sparse as sp
 
 from contactopt.derivatives.constants import INNER, ROUND
 from contactopt.derivatives.factors import UNIQUE, Factors, SparseFactors, dense_factors
 from contactopt.errors import InputError
-from contactopt.linear.operators import Interface, InterfaceOperator
+from contactopt.linear.operators import Interface, form, has_entries
 from contactopt.linear.stacked import Stacked, norm
 from contactopt.methods.constants import LOOSE
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
@@ -51,7 +50,7 @@ Inner = Callable[[Stacked], Stacked]  # the dimensionless solution for a right s
 
 def transposed(Q: Interface) -> Interface:
     """Q'; an operator is symmetric."""
-    return Q if isinstance(Q, InterfaceOperator) else Q.T
+    return Q if not has_entries(Q) else Q.T
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +77,7 @@ class Tangent:
     @cached_property
     def factors(self) -> Factors:
         """The factors of M, where Q is known by its entries."""
-        make = SparseFactors if sp.issparse(self.problem.Q) else dense_factors
+        make = SparseFactors if form(self.problem.Q) == "sparse" else dense_factors
         return make(self.problem.Q, self.V, self.rho, self.D)
 
     @cached_property
@@ -89,7 +88,7 @@ class Tangent:
     @cached_property
     def other(self) -> Solve | None:
         """What solves the system without factors of M, and only for a symmetric Q."""
-        if isinstance(self.problem.Q, InterfaceOperator):
+        if not has_entries(self.problem.Q):
             return _by_iteration(self)
         made = last_bonded(self.problem)
         return None if made is None else _by_bonded(self, made)

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from contactopt.errors import InputError
 from contactopt.fclib.text import compact
 from contactopt.files.writing import whole_file
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import has_entries
 from contactopt.problem import InterfaceProblem
 
 MAGIC = b"\x89HDF\r\n\x1a\n"  # the first bytes of an HDF5 file
@@ -100,7 +100,7 @@ def write(
             "FCLib knows Coulomb's law only; this problem"
             f" has {type(law).__name__} and cannot be written."
         )
-    if isinstance(problem.Q, InterfaceOperator):
+    if not has_entries(problem.Q):
         raise InputError("Q is known by its products only; write problem.explicit().")
     h5py = _h5py()
     with whole_file(path) as beside, h5py.File(beside, "w") as file:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from contactopt.coupling.back_to_bodies import Fields
+from contactopt.coupling.coupling import Coupling
+from contactopt.figures.closing import closing, gap_vectors
 from contactopt.figures.pieces import mesh_lines, outline, pieces, segments, surface, triangles
 from contactopt.figures.solids import draw_frame, picture, seen_from
 from contactopt.figures.style import (
@@ -30,14 +33,22 @@ PIXELS = 800  # of the longer side of the picture of solids, more than it takes 
 
 
 def deformed(
-    scene: Scene, problem: InterfaceProblem, fields: Sequence[Fields], ax: Any = None
+    scene: Scene,
+    problem: InterfaceProblem,
+    fields: Sequence[Fields],
+    ax: Any = None,
+    couplings: Sequence[Coupling] = (),
 ) -> Any:
     """Draw the deformed bodies, with these displacements and stresses, coloured by von Mises stress
-    and mirrored to the whole section (paper, figures 1 and 2).
+    and mirrored to the whole section (paper, figures 1 and 2). With the couplings of the pairs what
+    touches is drawn touching, whatever gap or overlap it had.
     """
     size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     largest = max(float(np.abs(f.displacement).max()) for f in fields)
-    scale = magnification(size, largest, float(np.ptp(problem.q[:, 0])))
+    gaps = [own.gap for own in couplings] or [problem.q[:, 0] - problem.q[:, 0].mean()]
+    scale = magnification(size, largest, gaps)
+    if couplings and scale > 1:
+        fields = _closed(scene, couplings, fields, 1.0 - 1.0 / scale, _mirror_plane(scene, problem))
     top = highest_colour([f.von_mises for f in fields])
     if scene.dim == 3:
         ax = _draw_solid(scene, fields, scale, top, ax)
@@ -47,6 +58,26 @@ def deformed(
     title = f"{scene.name}, {symbols(scene.friction)}{times}"
     ax.set_title(title, fontsize=ax.xaxis.label.get_size())
     return ax
+
+
+def _closed(
+    scene: Scene,
+    couplings: Sequence[Coupling],
+    fields: Sequence[Fields],
+    share: float,
+    plane: tuple[int, float] | None,
+) -> list[Fields]:
+    """The fields with a share of the initial gaps added to their displacements."""
+    made, kept = [], [] if plane is None else [plane]
+    for f in fields:
+        surfaces = [
+            (own.positions.T, gap_vectors(own.gap, own.frames[:, 0], f.name == pair.bodies[0]))
+            for pair, own in zip(scene.pairs, couplings)
+            if f.name in pair.bodies
+        ]
+        d = closing(f.mesh.p.T, surfaces, kept)
+        made.append(replace(f, displacement=f.displacement + share * d.T))
+    return made
 
 
 def _mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:

@@ -15,16 +15,17 @@ import numpy as np
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.cards import force_unit
-from contactopt.figures.html import filled, packed, write_html
+from contactopt.figures.html import filled, packed, remark_list, write_html
 from contactopt.figures.page_data import MOST_INSIDE, body_arrays, box_of, whole_box
 from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
 from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
-from contactopt.scenes.scene import BodyForce, Part, Plate, Scene, Traction
+from contactopt.scenes.scene import Part, Scene
 
 ROLES = ("no use", "support", "load", "plate", "contact")
+NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundary that stay legible
 
 
 def write_check_page(check: SceneCheck, file: str | Path) -> Path:
@@ -32,12 +33,18 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
     InputError if the file cannot be written.
     """
     scene = check.scene
-    pairs = [_pair(*both) for both in zip(scene.pairs, check.posed.couplings)]
     elastic = [body for body in check.posed.bodies if isinstance(body, AssembledElastic)]
     meshes = {body.name: body.body.basis.mesh for body in elastic}
     posed: Any = SimpleNamespace(scene=scene, planes=check.posed.planes)
     planes = [[scene.components.index(own["axis"]), own["place"]] for own in mirrors(posed)]
-    items = [item for body in elastic for item in _boundaries(scene, body.part, meshes[body.name])]
+    many = NORMALS // 2 ** len(planes)
+    pairs = [_pair(*both, many) for both in zip(scene.pairs, check.posed.couplings)]
+    symmetric = {(axis, place) for axis, place in map(tuple, planes)}
+    items = [
+        item
+        for body in elastic
+        for item in _boundaries(scene, body.part, meshes[body.name], symmetric)
+    ]
     items.sort(key=lambda item: item["role"] == 0)
     told = "Nothing has been solved yet. This is what will be solved."
     words = told, check.text, check.notes
@@ -94,7 +101,6 @@ def _write(
         "ring": scene.analysis.revolved,
         "mirrors": planes,
         "box": box.tolist(),
-        "near": box.tolist(),
         "contact": [(near[0] - wide).tolist(), (near[1] + wide).tolist()],
         "scale": 1.0,
         "most_scale": 1.0,
@@ -105,32 +111,56 @@ def _write(
         "states": 1,
         "moving": False,
         "history": None,
+        "columns": {},
     }
-    lines = "".join(f"<br>{html.escape(text)}" for text in words[1].splitlines()[1:])
+    lines = words[1].splitlines()[1:]
     body = filled(
         "view.html",
         scene=html.escape(scene.name),
-        certificate=words[0],
-        remarks="".join(f"<p><strong>{html.escape(note)}</strong></p>" for note in words[2]),
+        certificate=f"<p>{words[0]}</p>",
+        remarks=remark_list(words[2]),
         move="move" if scene.dim == 2 else "turn",
         followers="",
-        arrows="loads, and normals from the lower to the upper body,",
-        convention="A negative gap is an overlap. The arrow of a plate is its total force.",
+        arrows="loads, supports, and normals from the lower to the upper body,",
+        convention="A negative gap is an overlap. The arrow of a plate is its total force. A"
+        " support holds along the axis of its triangles, along all axes if they are full.",
         pairs="",
-        cells=f"<tr><td>{lines.removeprefix('<br>')}</td></tr>",
+        cells=_rows(lines if roles is ROLES else [f" {text}" for text in lines]),
     )
     return write_html(file, f"contactopt: {scene.name}", body, data, ["painter.js", "view.js"])
+
+
+def _rows(lines: Sequence[str]) -> str:
+    """HTML of the lines of a text: a row for each line 'name: words' with those below it that are
+    indented; pairs of surfaces first.
+    """
+    rows: list[list[str]] = []
+    for text in lines:
+        if text.startswith(" ") and rows:
+            rows[-1].append(text.strip())
+        else:
+            rows.append(text.split(": ", 1) if not text.startswith(" ") else ["", text])
+    rows.sort(key=lambda row: not row[0].startswith("pair "))
+    rows = [list(map(html.escape, row)) for row in rows if row[0] != "note"]  # which are remarks
+    return "".join(
+        f'<tr><th scope="row">{name}</th><td>{"<br>".join(words)}</td></tr>'
+        if name and words
+        else f'<tr><td colspan="2">{"<br>".join([name, *words])}</td></tr>'
+        for name, *words in rows
+    )
 
 
 def _bodies(scene: Scene, meshes: Mapping[str, Any], planes: list[Any]) -> list[dict[str, Any]]:
     """The bodies with meshes, each coloured by its number."""
     inside = scene.dim == 3 and sum(mesh.p.shape[1] for mesh in meshes.values()) <= MOST_INSIDE
     made = []
-    for number, (name, mesh) in enumerate(meshes.items()):
+    for name, mesh in meshes.items():
         kind, elements = elements_of(mesh)
         block = SimpleNamespace(type=kind, data=elements, dim=scene.dim)
         count = mesh.doflocs.shape[1]
-        values = {"move": np.zeros((1, count, scene.dim)), "body": np.full((1, count), number)}
+        values = {
+            "move": np.zeros((1, count, scene.dim)),
+        }
         drawn = SimpleNamespace(cells=[block], points=_spatial(mesh.doflocs))
         made.append({"name": name} | body_arrays(drawn, values, planes, inside))
     return made
@@ -141,7 +171,7 @@ def _spatial(points: np.ndarray) -> np.ndarray:
     return np.pad(points, ((0, 3 - len(points)), (0, 0))).T
 
 
-def _pair(pair: Any, made: Any) -> dict[str, Any]:
+def _pair(pair: Any, made: Any, many: int) -> dict[str, Any]:
     """The contacts of a pair with their gaps and normals."""
     return {
         "name": pair.name,
@@ -150,33 +180,65 @@ def _pair(pair: Any, made: Any) -> dict[str, Any]:
         "role": len(ROLES) - 1,
         "gap": made.gap,
         "vector": _spatial(made.frames[:, 0].T),
+        "marked": _spread(_spatial(made.positions), many),
     }
 
 
-def _boundaries(scene: Scene, part: Part, mesh: Any) -> Iterator[dict[str, Any]]:
-    """The named boundaries of a body, and what its loads are."""
-    held = {support.boundary for support in part.supports}
-    loads = {load.boundary: load for load in part.loads if not isinstance(load, BodyForce)}
+def _spread(places: np.ndarray, many: int) -> np.ndarray:
+    """Which (k,) of some places are marked: as many at most, each as far as can be from those
+    before it; the first is nearest to the middle.
+    """
+    marked = np.zeros(len(places), dtype=bool)
+    far = -np.linalg.norm(places - places.mean(axis=0), axis=1)
+    for _ in range(min(many, len(places))):
+        marked[last := int(np.argmax(far))] = True
+        away = np.linalg.norm(places - places[last], axis=1)
+        far = away if marked.sum() == 1 else np.minimum(far, away)
+    return marked
+
+
+def _boundaries(
+    scene: Scene, part: Part, mesh: Any, planes: set[tuple[int, float]]
+) -> Iterator[dict[str, Any]]:
+    """The named boundaries of a body, what its loads are, and along which axes supports hold it. A
+    boundary in a plane of symmetry, across which the body is shown whole, is hidden.
+    """
+    held = {support.boundary: support.displacement for support in part.supports}
+    centre = _spatial(mesh.p.mean(axis=1, keepdims=True))[0]
+    loads = {load.boundary: load for load in part.loads}
     for name, item in _sides(mesh):
         load = loads.get(name)
-        role = 3 if isinstance(load, Plate) else 2 if load else 1 if name in held else 0
+        role = (3 if load.level else 2) if load else 1 if name in held else 0
         if role == 0 and name in scene.surfaces_of(part):
             continue  # the pairs show it
         places, vector = item["places"], item["vector"]
-        if isinstance(load, Traction):
-            vector[:, : scene.dim] = load.value
-        elif isinstance(load, Plate):
-            nearest = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
-            vector[nearest, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
+        if load:
+            told = load.values(scene.components)
+            middle = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
+            vector[middle if load.level else slice(None), : scene.dim] = [
+                told.get(c, 0.0) for c in scene.components
+            ]
+        size = float(np.ptp(mesh.p, axis=1).max())
+        if any(np.ptp(places[:, a]) <= 1e-9 * size >= abs(places[0, a] - x) for a, x in planes):
+            item["hidden"] = True
+        if role == 1:
+            axes = np.array([c in (held[name] or scene.components) for c in scene.components])
+            if axes.all():  # one symbol, across the boundary
+                axes = 2.0 * (
+                    np.arange(scene.dim) == np.argmin(np.ptp(places, axis=0)[: scene.dim])
+                )
+            outward = np.where(places.mean(axis=0) > centre + 1e-6 * size, 1.0, -1.0)
+            item["held"] = np.tile(outward * np.pad(axes, (0, 3 - scene.dim)), (len(places), 1))
         yield item | {"name": f"{part.name}: {name} ({ROLES[role]})", "role": role}
-    for force in part.loads:
-        if isinstance(force, BodyForce):
+    for load in part.loads:
+        if not load.boundary:
+            force = np.array(list(load.values(scene.components).values()))
             yield {
-                "name": f"{part.name}: force per volume",
+                "name": f"{part.name}: {load.what}",
                 "places": _spatial(mesh.p.mean(axis=1, keepdims=True)),
                 "cells": np.zeros((0, 3), dtype=int),
                 "role": 2,
-                "vector": np.pad(np.array([force.value]), ((0, 0), (0, 3 - scene.dim))),
+                "vector": _spatial(force[:, None]),
             }
 
 
@@ -191,7 +253,8 @@ def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
         if len(mesh.p) == 3:
             cells = place[triangles(pieces(kind, _faces_on(mesh, facets, kind, faces)))]
         places = _spatial(mesh.doflocs[:, nodes])
-        yield name, {"places": places, "cells": cells, "vector": np.zeros(places.shape)}
+        marked, vector = _spread(places, SYMBOLS), np.zeros(places.shape)
+        yield name, {"places": places, "cells": cells, "vector": vector, "marked": marked}
 
 
 def _faces_on(mesh: Any, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
@@ -209,12 +272,12 @@ def _packed(item: dict[str, Any], dim: int) -> dict[str, Any]:
     states = {
         "role": np.full(k, item["role"]),
         "gap": item.get("gap", np.full(k, np.nan)),
-        "status": np.ones(k),
+        "status": item.get("marked", np.ones(k)) * 1.0,
         "vector": item["vector"],
-    }
+    } | ({"held": item["held"]} if "held" in item else {})
     return {
         "name": item["name"],
-        "hidden": item["role"] == 0,
+        "hidden": item["role"] == 0 or item.get("hidden", False),
         "points": packed(item["places"]),
         "move": packed(np.zeros((1, k, dim))),
         "cells": packed(triangles(flat)),

@@ -12,7 +12,7 @@ import base64
 import gzip
 import html
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
@@ -91,6 +91,15 @@ def filled(name: str, **texts: str) -> str:
     for NAME, with every name in it escaped.
     """
     return Template(_page_file(name)).substitute(texts)
+
+
+def remark_list(remarks: Iterable[str]) -> str:
+    """HTML of remarks, each folded to one line under its number."""
+    return "".join(
+        '<details class="remark"><summary>'
+        f"<em>note {n}</em> {html.escape(text)}</summary></details>"
+        for n, text in enumerate(remarks, 1)
+    )
 
 
 def _page_file(name: str) -> str:

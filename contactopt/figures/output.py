@@ -58,7 +58,8 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
 
     problem, solution = result.problem, result.solution
     if result.fields:
-        picture = plots.deformed(result.scene, part_of(problem, problem.pairs[0]), result.fields)
+        first, couplings = part_of(problem, problem.pairs[0]), result.reduction.couplings
+        picture = plots.deformed(result.scene, first, result.fields, couplings=couplings)
         save(picture.figure, "deformed")
     if any(part.elastic and not part.meshed for part in result.scene.parts):
         save(plots.maps_figure(result.reduction, result.solution), "maps")

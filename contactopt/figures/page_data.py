@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.cards import force_unit
+from contactopt.figures.closing import closing, gap_vectors
 from contactopt.figures.html import packed, packed_short
 from contactopt.figures.output import SERIES, SINGLE
 from contactopt.figures.pieces import (
@@ -28,9 +29,11 @@ from contactopt.figures.pieces import (
 from contactopt.figures.style import highest_colour, magnification
 from contactopt.scenes.kinds import KINDS
 
-REACH = 4.0  # sizes of a small contact surface that the first picture of large bodies shows
+NEAREST = 16  # how many times as large as the picture of a contact the bodies may be
+TURNS = 0.5  # length of the mean of unit normals below which a surface goes around something
 # cosine of the angle between two faces from which on their edge is drawn
 SHARP = np.cos(np.deg2rad(30))
+ROUNDING = 1e-12  # of a surface, below which a gap or a slip is what rounding leaves of zero
 ON_PLANE = 1e-9  # of the size of a body, within which a node lies in a plane of symmetry
 # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut
 MOST_INSIDE = 40_000
@@ -55,17 +58,22 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         for name, values in fields.items():
             values |= _at_all_states(folder, name, len(path["reactions"]), len(axes))
     box = whole_box(box_of([mesh.points for mesh in (*bodies.values(), *pairs.values())]), mirrors)
-    near = _near_contact(whole_box(box_of([mesh.points for mesh in pairs.values()]), mirrors), box)
     largest = max((float(np.abs(values["move"]).max()) for values in fields.values()), default=0.0)
-    gap = max(float(mesh.point_data["contact_gap"].max()) for mesh in pairs.values())
-    reach = float(np.ptp(near, axis=0).max())
+    gaps = [mesh.point_data["contact_initial_gap"] for mesh in pairs.values()]
+    boxes = _boxes(pairs, box, mirrors, len(axes))
+    _close(bodies, fields, pairs, summary, mirrors)
+    # a small contact on large bodies is looked at from near, so that less is seen of motions
+    reach = min(float(np.ptp(box, axis=0).max()), 4 * max(np.ptp(b, axis=0).max() for b in boxes))
     stresses = [values["von_mises"].ravel() for values in fields.values()]
     inside = len(axes) == 3 and sum(len(mesh.points) for mesh in bodies.values()) <= MOST_INSIDE
-    contacts, first = [], 0
+    contacts: list[dict[str, Any]] = []
+    first = 0
     for name, mesh in pairs.items():
         own = slice(first, first + len(mesh.points))
-        move = _motion(bodies, fields, mesh.points, len(axes))
-        contacts.append({"name": name} | _contact(mesh, move, interface, path, own))
+        motion = _motion(bodies, fields, mesh.points, len(axes))
+        names, near = summary["pairs"][name]["bodies"], boxes[len(contacts)].tolist()
+        told = {"name": name, "bodies": names, "box": near}
+        contacts.append(told | _contact(mesh, motion, interface, path, own))
         first = own.stop
     return {
         "units": [*summary["units"], force_unit(summary["units"])],
@@ -74,10 +82,8 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "ring": kind.revolved,
         "mirrors": mirrors,
         "box": box.tolist(),
-        "near": near.tolist(),
-        "contact": _touching(pairs, box).tolist(),
-        "scale": magnification(reach, largest, gap),
-        "most_scale": 2.0 * magnification(reach, largest, 0.0),
+        "scale": magnification(reach, largest, gaps),
+        "most_scale": 2.0 * magnification(reach, largest),
         "top": highest_colour(stresses) if stresses else 1.0,
         "bodies": [
             {"name": name} | body_arrays(mesh, fields[name], mirrors, inside)
@@ -86,7 +92,9 @@ def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
         "contacts": contacts,
         "states": 1 if path is None else len(path["reactions"]),
         "moving": moving,
-        "history": None if path is None else _history(folder / "history.csv"),
+        "history": None if path is None else (history := _history(folder / "history.csv")),
+        "columns": {} if path is None else {name: _column(name, summary) for name in history},
+        "first": int(np.argmax([own["peak"] for own in contacts])),
     }
 
 
@@ -111,28 +119,46 @@ def whole_box(box: np.ndarray, mirrors: list[list[Any]]) -> np.ndarray:
     return box
 
 
-def _near_contact(contact: np.ndarray, box: np.ndarray) -> np.ndarray:
-    """The box (2, 3) of the first picture: of all bodies, or about a small contact on them."""
-    half = REACH * float(np.ptp(contact, axis=0).max()) / 2
-    if half <= 0 or half > float(np.ptp(box, axis=0).max()) / 4:
-        return box
-    centre = contact.mean(axis=0)
-    return np.stack([np.maximum(box[0], centre - half), np.minimum(box[1], centre + half)])
-
-
-def _touching(pairs: dict[str, Any], box: np.ndarray) -> np.ndarray:
-    """The box (2, 3) about the contacts that touch; about the largest pressure, where they reach
-    across half of all bodies.
+def _boxes(
+    pairs: dict[str, Any], box: np.ndarray, mirrors: list[list[Any]], dim: int
+) -> list[np.ndarray]:
+    """For each pair the box (2, 3) of the picture of its contact, with mirror images: about what
+    touches; in the plane, where nothing hides another pair, about all that touches.
     """
-    points = np.concatenate([mesh.points for mesh in pairs.values()])
-    pressure = np.concatenate([mesh.point_data["contact_pressure"] for mesh in pairs.values()])
-    touching = points[pressure > 0] if np.any(pressure > 0) else points
-    size, half = float(np.ptp(box, axis=0).max()), 0.7 * float(np.ptp(touching, axis=0).max())
-    centre = (touching.min(axis=0) + touching.max(axis=0)) / 2
-    if half > size / 4:
-        centre, half = points[np.argmax(pressure)], size / 4
-    half = half or size / 20
-    return np.stack([np.maximum(box[0], centre - half), np.minimum(box[1], centre + half)])
+    found, least = [], float(np.ptp(box, axis=0).max()) / NEAREST
+    for mesh in pairs.values():
+        pressure = mesh.point_data["contact_pressure"]
+        touching = mesh.points[pressure > 0.01 * max(pressure.max(initial=0.0), 0.0)]
+        found.append(box_of([touching if len(touching) else mesh.points]))
+    if dim == 2:
+        found = [box_of(found)] * len(found)
+    boxes = []
+    for own in found:
+        low, high = whole_box(own, mirrors)
+        half = max(0.65 * float((high - low).max()), least / 2)
+        ends = (low + high) / 2 + np.array([[-half], [half]])
+        boxes.append(np.stack([np.maximum(box[0], ends[0]), np.minimum(box[1], ends[1])]))
+    return boxes
+
+
+def _close(
+    bodies: dict[str, Any],
+    fields: dict[str, dict[str, np.ndarray]],
+    pairs: dict[str, Any],
+    summary: dict[str, Any],
+    mirrors: list[list[Any]],
+) -> None:
+    """Give the bodies the field that closes initial gaps as `lift` (1, n, dim)."""
+    for name, mesh in bodies.items():
+        dim, surfaces = fields[name]["move"].shape[2], []
+        for pair, own in pairs.items():
+            upper, *_ = names = summary["pairs"][pair]["bodies"]
+            gap, normals = (own.point_data[f"contact_{key}"] for key in ("initial_gap", "normal"))
+            if name in names:
+                vectors = gap_vectors(gap, normals[:, :dim], name == upper)
+                surfaces.append((own.points[:, :dim], vectors))
+        d = closing(mesh.points[:, :dim], surfaces, [(axis, place) for axis, place in mirrors])
+        fields[name]["lift"] = d[None]
 
 
 def _body_values(data: dict[str, np.ndarray], dim: int) -> dict[str, np.ndarray]:
@@ -175,6 +201,7 @@ def body_arrays(
     return {
         "points": packed(mesh.points[nodes]),
         "move": shown.pop("move"),
+        "lift": shown.pop("lift", None),
         "values": shown,
         **{name: packed(place[numbers]) for name, numbers in drawn.items()},
     }
@@ -198,32 +225,59 @@ def _apart(
 
 def _motion(
     bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray, dim: int
-) -> np.ndarray:
-    """Displacements (s, k, dim) of places (k, 3), from the nearest node; none without bodies."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Displacements (s, k, dim) of places (k, 3), from the nearest node, and what closes gaps
+    there (1, k, dim); none without bodies.
+    """
     if not bodies:
-        return np.zeros((1, len(points), dim))
+        return np.zeros((1, len(points), dim)), np.zeros((1, len(points), dim))
     nearest = KDTree(np.concatenate([mesh.points for mesh in bodies.values()])).query(points)[1]
-    return np.asarray(np.concatenate([fields[name]["move"] for name in bodies], axis=1)[:, nearest])
+    move, lift = (
+        np.concatenate([fields[name][key] for name in bodies], axis=1)[:, nearest]
+        for key in ("move", "lift")
+    )
+    return move, lift
 
 
 def _contact(
     mesh: Any,
-    move: np.ndarray,
+    motion: tuple[np.ndarray, np.ndarray],
     interface: dict[str, np.ndarray],
     path: dict[str, np.ndarray] | None,
     own: slice,
 ) -> dict[str, Any]:
-    """One pair of surfaces: places, displacements (s, k, dim), and values of every state."""
+    """One pair of surfaces: places, their motion, and values of every state; the mean normal where
+    the pressure is, if the surface does not go around something.
+    """
     (block,) = mesh.cells
-    flat = np.zeros((0, 3), dtype=int) if block.type == "line" else triangles(block.data)
+    line = block.type == "line"
+    flat = np.zeros((0, 3), dtype=int) if line else triangles(block.data)
+    pressure, normals = (mesh.point_data[f"contact_{key}"] for key in ("pressure", "normal"))
+    weights = pressure.clip(0) if np.any(pressure > 0) else np.ones(len(pressure))
+    mean = np.average(normals, axis=0, weights=weights)
+    size, extent = float(np.linalg.norm(mean)), float(np.ptp(mesh.points, axis=0).max())
     states = _last_state(mesh, interface, own) if path is None else _contact_states(path, own)
     return {
         "points": packed(mesh.points),
-        "move": _packed(move),
+        "move": _packed(motion[0]),
+        "lift": packed(motion[1]),
         "cells": packed(flat),
+        "lines": packed(block.data if line else np.zeros((0, 2), dtype=int)),
+        "normal": (mean / size).tolist() if size > TURNS else None,
+        "peak": float(pressure.max(initial=0.0)),
         "place": packed(interface["x"][own].T),
-        "states": {name: packed(np.nan_to_num(value)) for name, value in states.items()},
+        "states": {
+            name: packed(
+                _rounded(value, extent) if name in ("gap", "slip") else np.nan_to_num(value)
+            )
+            for name, value in states.items()
+        },
     }
+
+
+def _rounded(lengths: np.ndarray, extent: float) -> np.ndarray:
+    """Lengths without what rounding leaves of zero."""
+    return np.where(np.abs(np.nan_to_num(lengths)) > ROUNDING * extent, lengths, 0.0)
 
 
 def _last_state(mesh: Any, interface: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:
@@ -263,6 +317,15 @@ def _history(file: Path) -> dict[str, list[float]]:
     with open(file, newline="") as table:
         rows = list(csv.DictReader(table))
     return {key: found for key in rows[0] if (found := _numbers([row[key] for row in rows]))}
+
+
+def _column(name: str, summary: dict[str, Any]) -> str:
+    """The name of a column of the history, with its unit."""
+    length, force = summary["units"][0], force_unit(summary["units"])
+    units = {"seconds": "s"} | {f"{side}_force": force for side in ("normal", "shear")}
+    units |= dict.fromkeys(("approach", "shift", "contact_half_width", "stick_half_width"), length)
+    unit = f"{force} {length}" if name.endswith(("energy", "work")) else units.get(name, "")
+    return name.replace("_", " ") + (f" [{unit}]" if unit and "[" not in name else "")
 
 
 def _numbers(texts: list[str]) -> list[float]:

@@ -26,7 +26,7 @@ from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.unbalanced_loads import escape, resisted, sentence
 from contactopt.readings.plausibility import doubts, said_of_meshes
-from contactopt.scenes.scene import Plate, Scene
+from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
 
 CLOSED = 1e-9  # of the size of a surface, within which a gap is what rounding leaves of zero
@@ -140,7 +140,7 @@ def _held(part: Any, name: str, free: InterfaceProblem) -> str:
     """What holds a body."""
     start = f"body '{name}': "
     names = [name.removeprefix(start) for name in free.motions if name.startswith(start)]
-    plates = any(isinstance(load, Plate) for load in getattr(part, "loads", ()))
+    plates = any(load.level for load in getattr(part, "loads", ()))
     holders = [
         word
         for word, there in (("supports", getattr(part, "supports", ())), ("plates", plates))

@@ -4,7 +4,6 @@ what is known exactly.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from importlib import import_module
 from inspect import Parameter, getdoc, signature
 from typing import Any
@@ -16,7 +15,8 @@ from contactopt.figures.pieces import pieces, surface, triangles
 from contactopt.figures.solids import nearest
 from contactopt.meshes.cells import elements_of
 from contactopt.scenes import PATHS, SCENES, make_path, make_scene
-from contactopt.scenes.scene import Plate, Scene, Traction
+from contactopt.scenes.loads.load import number_words
+from contactopt.scenes.scene import Scene
 
 COLUMNS, ROWS = 60, 24  # of the sketch, at most
 ASPECT = 2.0  # height of a character over its width
@@ -106,27 +106,14 @@ def part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
         lines[0] += f"; {size} {length}"
         for support in part.supports:
             held = support.displacement
-            what = "clamped" if held is None else _components(held)
+            what = "clamped" if held is None else number_words(held)
             lines.append(f"  support '{support.boundary}': {what}")
-        lines += [f"  {_load(load)}" for load in part.loads]
+        lines += [f"  {load.words(scene.components)}" for load in part.loads]
     elif not part.elastic:
         lines[0] += ": rigid"
     if getattr(part, "force", None):
-        lines.append(f"  total force: {_components(part.force)}")
+        lines.append(f"  total force: {number_words(part.force)}")
     return lines
-
-
-def _components(vector: Mapping[str, float]) -> str:
-    return ", ".join(f"{name} = {value:g}" for name, value in vector.items())
-
-
-def _load(load: Any) -> str:
-    if isinstance(load, Plate):
-        return f"plate on '{load.boundary}': total force {_components(load.force)}"
-    value = ", ".join(f"{v:g}" for v in load.value)
-    if isinstance(load, Traction):
-        return f"traction on '{load.boundary}': {value}"
-    return f"force per volume: {value}"
 
 
 def sketch(meshes: list[Any]) -> list[str]:

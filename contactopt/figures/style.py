@@ -22,20 +22,22 @@ LETTERS, LINE, MARK = 7.0, 1.1, 3.2  # sizes [pt]
 FORMATS = ("png", "svg", "pdf")
 DPI = 200
 SHARE = 0.08  # of the bodies' size that the largest displacement is drawn as
-# a gap above this fraction of the largest displacement: bodies that were apart would seem to
-# overlap if magnified
+# of the largest displacement, by which the initial gap of a pair may vary and still be one distance
 APART = 1e-3
 # quantile of the von Mises stress where the colours end: singular corners would take them all
 TOP = 0.998
 
 
-def magnification(size: float, displacement: float, gap: float) -> float:
-    """The factor by which displacements are drawn: a round number of at least 1, and 1 where bodies
-    are apart, for bodies of a size, their largest displacement and their largest gap [length].
+def magnification(size: float, displacement: float, gaps: Sequence[np.ndarray] = ()) -> float:
+    """The factor by which displacements and the initial gaps of the pairs are drawn, for bodies of
+    a size and their largest displacement [length]: a round number of at least 1. It is 1 where the
+    gap of a pair varies, because a shape would be magnified.
     """
-    if displacement == 0 or gap > APART * displacement:
+    varies = max((float(np.ptp(gap)) for gap in gaps if len(gap)), default=0.0)
+    if displacement == 0 or varies > APART * displacement:
         return 1.0
-    target = SHARE * size / displacement
+    largest = max([displacement, *(float(np.abs(gap).max(initial=0.0)) for gap in gaps)])
+    target = SHARE * size / largest
     if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
         return 1.0
     power = 10.0 ** np.floor(np.log10(target))

@@ -23,9 +23,18 @@ import numpy as np
 from contactopt.cards import columns
 from contactopt.checks import short
 from contactopt.errors import InputError
-from contactopt.figures.html import filled, write_html
+from contactopt.figures.html import filled, remark_list, write_html
 from contactopt.figures.page_data import page_data
 from contactopt.outcome import pair_rows, summary_rows
+
+WORDS = {
+    "peak": "peak pressure",
+    "area": "contact area",
+    "normal": "normal force",
+    "friction": "friction force",
+    "of": "of what friction can carry",
+    "stick": "contacts that stick",
+}
 
 
 def write_page(folder: str | Path, file: str | Path) -> Path:
@@ -78,6 +87,16 @@ def certificate_words(summary: dict[str, Any]) -> str:
     return f"This is not a solution, only the last iterate ({why}). {said}"
 
 
+def _answer(summary: dict[str, Any]) -> str:
+    """The rows of the command line's table of pairs as columns, with longer names."""
+    heads, *pairs = pair_rows(summary)
+    names = [""]
+    for head in heads[1:]:
+        name, _, unit = head.partition("\n")
+        names.append(WORDS.get(name, name) + (f" [{unit}]" if unit and name != "of" else ""))
+    return f'<div class="answer">{columns([*zip(names, *pairs)])}</div>'
+
+
 def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
     """The HTML of the page, all names in it escaped."""
     followers = (
@@ -91,16 +110,18 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
             " state. The slip is that since the state before."
         )
     rows = {html.escape(name): html.escape(words) for name, words in summary_rows(summary).items()}
-    remarks = (html.escape(text) for text in summary.get("remarks", ()))
+    verdict, _, certificate = certificate_words(summary).partition(". ")
+    opened = "" if summary["status"] == "solved" else " open"
     return filled(
         "view.html",
         scene=html.escape(summary["scene"]),
-        certificate=html.escape(certificate_words(summary)),
-        remarks="".join(f"<p><strong>{text}</strong></p>" for text in remarks),
+        certificate=f"<details{opened}><summary>{html.escape(verdict)}.</summary>"
+        f"<p>{html.escape(certificate)}</p></details>",
+        remarks=remark_list(summary.get("remarks", ())),
         move="move" if data["dim"] == 2 else "turn",
         followers=followers,
         arrows="forces on the upper body",
-        pairs=columns(pair_rows(summary)),
+        pairs=_answer(summary),
         convention="Sign convention: the pressure is positive in compression; tractions are those"
         " on the upper body.",
         cells="".join(

@@ -27,6 +27,10 @@ SHARE = 15  # usual number of elements along the diagonal of the smallest body
 AROUND = 16  # elements around a full circle, where the size does not make them smaller
 GRID = (np.arange(15) + 0.5) / 15  # parameters of a face among which a place on it is looked for
 FLAT = 1e-5  # a part is plane if it is thinner than this fraction of its size
+SAMPLES = 100  # places on a fine edge from which distances are measured
+GROWTH = 0.5  # of the size of elements with the distance from a fine edge or point
+POINT = re.compile(r"[-+.\de]+(,[-+.\de]+){1,2}", re.IGNORECASE)
+Where = tuple[int, list[int]] | np.ndarray  # dimension and entities, or a point (3,)
 ALONG = 1 - 1e-9  # component of a normal that lies along an axis
 
 
@@ -41,10 +45,11 @@ def mesh_part(
     """Mesh a part, a file that ends in one of ENDINGS, and write a file of Gmsh, lengths in
     millimetres unless the part has no unit.
 
-    Elements have a size, else what gives SHARE of them along the smallest body; `fine` is boundary
-    -> size on it [length]. `names` is new name -> boundaries that are called by it, and order 1
-    makes straight elements, 2 curved ones. InputError without Gmsh, for a file that it cannot read
-    or mesh, and for an unknown boundary.
+    Elements have a size, else what gives SHARE of them along the smallest body; `fine` is place ->
+    size there [length]: a boundary, an edge where two meet as 'z-/cylinder1' (in the plane a
+    corner), curved boundaries by 'radius=2', or a point as '0,0,5'. `names` is new name ->
+    boundaries that are called by it, and order 1 makes straight elements, 2 curved ones. InputError
+    without Gmsh, for a file that it cannot read or mesh, and for an unknown place.
     """
     for what, value in [("the size of elements", size), *(fine or {}).items()]:
         if value is not None:
@@ -77,7 +82,7 @@ def mesh_part(
             name: [tag for old in own for tag in _called(sides, old, path)]
             for name, own in (names or {}).items()
         }
-        at = {n: (new.get(n) or _called(sides, n, path), s) for n, s in (fine or {}).items()}
+        at = [(_place(gmsh, dim, sides, new, n, path), s) for n, s in (fine or {}).items()]
         _sizes(gmsh, dim, bodies.values(), size, at)
         _groups(gmsh, dim, bodies, sides, new)
         try:
@@ -178,28 +183,97 @@ def _called(sides: Mapping[str, int], name: str, path: Path) -> list[int]:
     return found
 
 
+def _place(
+    gmsh: Any,
+    dim: int,
+    sides: Mapping[str, int],
+    new: Mapping[str, list[int]],
+    name: str,
+    path: Path,
+) -> Where:
+    """The dimension and the entities of a place where elements shall be fine, or a point (3,)."""
+    if POINT.fullmatch(name):
+        try:
+            x = np.array([*map(float, name.split(",")), 0.0][:3])
+        except ValueError as error:
+            raise InputError(f"a point is given as X,Y,Z, as in 0,0,5; got {name!r}.") from error
+        low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+        if np.any((x < low) | (x > high)):
+            raise InputError(f"the point {name} lies outside of part '{path}'.")
+        return x
+    kind, sign, asked = name.partition("=")
+    if kind == "radius" and sign:
+        radii = {tag: radius for tag in sides.values() if (radius := _radius(gmsh, dim, tag))}
+        found = [tag for tag, own in radii.items() if f"{own:.3g}" == f"{_number(asked):.3g}"]
+        if not found:
+            there = ", ".join(sorted({f"{own:.3g}" for own in radii.values()}, key=float))
+            raise InputError(
+                f"part '{path}' has no boundary of radius {asked}; its radii are {there or 'none'}."
+            )
+        return dim - 1, found
+    both = [new.get(own) or _called(sides, own, path) for own in name.split("/")]
+    if len(both) == 1:
+        return dim - 1, both[0]
+    rims = [
+        {
+            tag
+            for side in own
+            for _, tag in gmsh.model.getBoundary([(dim - 1, side)], oriented=False)
+        }
+        for own in both
+    ]
+    if not (shared := sorted(set.intersection(*rims))):
+        raise InputError(f"the boundaries {' and '.join(name.split('/'))} do not meet.")
+    return dim - 2, shared
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"a radius is a number, as in radius=2; got {text!r}.") from error
+
+
+def _radius(gmsh: Any, dim: int, tag: int) -> float:
+    """The smallest radius of curvature in the middle of a side, 0 where it is flat."""
+    low, high = gmsh.model.getParametrizationBounds(dim - 1, tag)
+    curvature = abs(gmsh.model.getCurvature(dim - 1, tag, (np.array(low) + high) / 2)[0])
+    return 1 / curvature if curvature > 0 else 0.0
+
+
 def _sizes(
     gmsh: Any,
     dim: int,
     bodies: Iterable[int],
     size: float | None,
-    fine: Mapping[str, tuple[list[int], float]],
+    fine: Iterable[tuple[Where, float]],
 ) -> None:
-    """Sizes of elements; they grow from fine sides into the bodies."""
+    """Sizes of elements; they grow from fine places into the bodies."""
     boxes = [np.reshape(gmsh.model.getBoundingBox(dim, tag), (2, 3)) for tag in bodies]
     usual = min(float(np.linalg.norm(high - low)) for low, high in boxes) / SHARE
     gmsh.option.setNumber("Mesh.MeshSizeMax", usual if size is None else size)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", AROUND)
-    field, restricted = gmsh.model.mesh.field, []
-    for tags, value in fine.values():
-        constant = field.add("MathEval")
-        field.setString(constant, "F", f"{value:.12g}")
-        restricted.append(field.add("Restrict"))
-        field.setNumber(restricted[-1], "InField", constant)
-        field.setNumbers(restricted[-1], "SurfacesList" if dim == 3 else "CurvesList", tags)
-    if restricted:
+    field, found = gmsh.model.mesh.field, []
+    for place, value in fine:
+        law = field.add("MathEval")
+        found.append(law)
+        if isinstance(place, np.ndarray):
+            away = "+".join(f"({c}-({x:.12g}))^2" for c, x in zip("xyz", place))
+            field.setString(law, "F", f"{value:.12g}+{GROWTH}*Sqrt({away})")
+            continue
+        below, tags = place
+        inside = field.add("Restrict" if below == dim - 1 else "Distance")
+        field.setNumbers(inside, ("PointsList", "CurvesList", "SurfacesList")[below], tags)
+        if below == dim - 1:
+            field.setString(law, "F", f"{value:.12g}")
+            field.setNumber(inside, "InField", law)
+            found[-1] = inside
+        else:
+            field.setNumber(inside, "Sampling", SAMPLES)
+            field.setString(law, "F", f"{value:.12g}+{GROWTH}*F{inside}")
+    if found:
         least = field.add("Min")
-        field.setNumbers(least, "FieldsList", restricted)
+        field.setNumbers(least, "FieldsList", found)
         field.setAsBackgroundMesh(least)
 
 

@@ -37,12 +37,10 @@ from itertools import count
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from contactopt.errors import BackendError, InputError
-from contactopt.linear.convolution import Convolution
 from contactopt.linear.deadline import check_time
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import form, has_entries
 from contactopt.methods import NoSolution, Repeated, constants
 from contactopt.methods.cone import AcaryCadoux
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations, definite
@@ -94,7 +92,7 @@ class Auto(Method):
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
     ) -> Iterator[Iterate | Known]:
-        sparse, sweeping = sp.issparse(problem.Q), problem
+        sparse, sweeping = form(problem.Q) == "sparse", problem
         if sparse and problem.q.size <= constants.SMALL:
             problem = problem.altered(Q=problem.Q.toarray())
         swept = _Swept(sweeping, start)
@@ -105,7 +103,7 @@ class Auto(Method):
         if loose:
             reached = start or at_rest(problem)
         else:
-            if isinstance(problem.Q, Convolution):
+            if form(problem.Q) == "convolution":
                 points = Nested().with_residuals(problem, start)
                 best, _ = yield from _followed(
                     points, lambda steps, since: since >= constants.PATIENCE
@@ -113,7 +111,7 @@ class Auto(Method):
                 start = best or start
                 note(logger, NO_PROGRESS_NESTED)
             reached = yield from _newton(problem, start, self.preconditioner)
-            if isinstance(problem.Q, InterfaceOperator):
+            if not has_entries(problem.Q):
                 note(logger, NO_PROGRESS_PRODUCTS)
                 try:
                     problem = problem.explicit()
@@ -140,8 +138,8 @@ class _Swept:
         second has all digits, and the first most of them where each sweep is expensive.
         """
         problem = self.problem
-        explicit = isinstance(problem.Q, np.ndarray) or sp.issparse(problem.Q)
-        size = problem.Q.nnz if sp.issparse(problem.Q) else problem.q.size**2
+        explicit = has_entries(problem.Q)
+        size = problem.Q.nnz if form(problem.Q) == "sparse" else problem.q.size**2
         cost = size + constants.LOCAL * problem.contacts
         left = int(min(most, budget / cost))
         if not explicit or left < constants.FEWEST_SWEEPS:
@@ -318,15 +316,13 @@ def _newton(
     own products have cost as much. A start that leads nowhere is given up for the bonded solution.
     """
     Q = problem.Q
-    dear = isinstance(Q, InterfaceOperator) and (
-        Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES
-    )
+    dear = not has_entries(Q) and (Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES)
 
     def tired(steps: int, since: int) -> bool:
         return since >= constants.PATIENCE or steps > constants.NEWTON_STEPS
 
     def spent(steps: int, since: int) -> bool:
-        cheaper = dear and isinstance(Q, InterfaceOperator) and Q.products < problem.q.size
+        cheaper = dear and not has_entries(Q) and Q.products < problem.q.size
         return tired(steps, since) and not cheaper
 
     method, warm, least = Newton(preconditioner=preconditioner), start, np.inf

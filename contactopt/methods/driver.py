@@ -9,13 +9,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from contactopt.checks import check_number
 from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
-from contactopt.linear.operators import Interface, InterfaceOperator, diagonal, loosened
+from contactopt.linear.operators import (
+    Interface,
+    diagonal,
+    form,
+    has_entries,
+    loosened,
+)
 from contactopt.linear.stacked import Stacked
 from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
 from contactopt.methods.auto import Auto
@@ -110,7 +115,7 @@ def solve(
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
         remark(problem, solution)
-    return replace(solution, notes=tuple(notes))
+    return replace(solution, notes=tuple(notes)) if notes else solution
 
 
 def _method_for(
@@ -170,7 +175,7 @@ def _run(
             f"method '{type(method).__name__.lower()}' minimises an energy, which an unsymmetric Q"
             " does not have; use auto or proximal."
         )
-    if not getattr(method, "sparse" if sp.issparse(problem.Q) else "implicit", False):
+    if not getattr(method, "sparse" if form(problem.Q) == "sparse" else "implicit", False):
         problem = problem.explicit()
     held, basis, loose = resisted(problem)
     if loose:
@@ -266,7 +271,7 @@ def _turned(steps: Iterator[Iterate | Known]) -> Iterate | Known | None:
 
 def _counts(Q: Interface) -> dict[str, float]:
     """Products with an operator Q so far and, where a method works on the bodies, V-cycles."""
-    if not isinstance(Q, InterfaceOperator):
+    if has_entries(Q):
         return {}
     counts: dict[str, float] = {"products": Q.products}
     return counts if Q.coupled is None else counts | {"cycles": Q.coupled.cycles}

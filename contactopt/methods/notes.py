@@ -12,7 +12,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import InterfaceOperator, form
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.certificate import amplification
 from contactopt.problem.scaling import immovable
@@ -52,7 +52,7 @@ def remark(problem: InterfaceProblem, solution: Solution) -> None:
     contacts at one place can exchange forces.
     """
     at, loose = solution, solution.solved and solution.residual > EXACT
-    if loose and problem.contacts <= FEW and isinstance(problem.Q, np.ndarray):
+    if loose and problem.contacts <= FEW and form(problem.Q) == "array":
         condition = amplification(problem, at.reactions, at.multipliers)
         if WEDGED < condition < np.inf and condition * at.residual > MUCH:
             asked = problem.law.proportional and not problem.law.dilatant

@@ -21,11 +21,10 @@ from math import hypot, inf
 from typing import ClassVar
 
 import numpy as np
-import scipy.sparse as sp
 
 from contactopt.checks import check_number
 from contactopt.linear.deadline import check_time
-from contactopt.linear.operators import Interface
+from contactopt.linear.operators import Interface, form
 from contactopt.methods.kernels.gauss_seidel import Sweeps
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
@@ -97,7 +96,7 @@ class NSGS(Method):
 def _coupling(Q: Interface, dim: int, i: int) -> tuple[slice | np.ndarray, np.ndarray, np.ndarray]:
     """The components that move contact i, their part (dim, m) of Q, its own block (dim, dim)."""
     own = slice(dim * i, dim * (i + 1))
-    if not sp.issparse(Q):
+    if form(Q) != "sparse":
         return slice(None), Q[own], Q[own, own]
     row = Q[own]
     others = np.unique(row.indices)

@@ -19,6 +19,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from contactopt.checks import check_number
+from contactopt.linear.operators import form
 from contactopt.methods import constants
 from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equations
 from contactopt.methods.kernels.damped import solve_subproblem
@@ -46,7 +47,7 @@ class Proximal(Method):
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         matrix = block_matrix(problem.Q, problem.dim)
-        bonded = isinstance(problem.Q, np.ndarray)
+        bonded = form(problem.Q) == "array"
         point = start or (cold_start(problem) if bonded else at_rest(problem))
         yield from proximal_iterates(problem, matrix, point, self.alpha)
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import time
 
 import numpy as np
-import scipy.sparse as sp
 
+from contactopt.linear.operators import form
 from contactopt.methods import constants
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels import gauss_seidel
@@ -31,9 +31,9 @@ def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None,
         return None, None
     if type(law) is not Coulomb or not problem.q.size:
         return None, None
-    if sp.issparse(Q):
+    if form(Q) == "sparse":
         rows = Q.indptr.astype(np.int64), Q.indices.astype(np.int64), Q.data
-    elif isinstance(Q, np.ndarray):
+    elif form(Q) == "array":
         rows = gauss_seidel.NONE, gauss_seidel.NONE, Q
     else:
         return None, None

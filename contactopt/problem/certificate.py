@@ -127,12 +127,12 @@ def natural_map_residual(
     InputError : On shapes that do not fit.
     """
     r, lam = _checked(problem, reactions, multipliers)
-    if not (np.all(np.isfinite(r)) and np.all(np.isfinite(lam))):
+    if not (np.isfinite(r).all() and np.isfinite(lam).all()):
         return np.inf
     if len(r) == 0:
         return balance_residual(problem, r)
     d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
-    w = problem.q + (problem.V @ lam).reshape(r.shape)
+    w = problem.q + (problem.V @ lam).reshape(r.shape) if len(lam) else problem.q
     u = d + w
     measure = yardsticks(problem, r, d, w)
     beyond = lengths(r[:, 1:]) - problem.law.bound_along(r)
@@ -156,19 +156,19 @@ def yardsticks(
     size, gap = lengths(r), w[:, 0]
     largest = float(size.max())
     weight = np.minimum(1.0, size / (ACTS * largest)) if largest > 0 else np.zeros(len(r))
-    overlap = -gap if problem.law.unilateral else np.where(problem.law.lowest < 0, abs(gap), -gap)
+    away = np.abs(gap)
+    overlap = -gap if problem.law.unilateral else np.where(problem.law.lowest < 0, away, -gap)
     length = max(
         float((weight * lengths(d)).max()),
         float(overlap.max()),
-        float(np.abs(gap).min()),
-        ROUNDED * float((weight * lengths(problem.q)).max()),
+        float(away.min()),
+        ROUNDED * float((weight * problem.gaps).max()),
     )
     compliance, plates = problem.compliances, _plate_force(problem)
-    moves = compliance > 0
-    shares = size * moves
-    shares = shares if shares.any() else moves.astype(float)
-    total = float(shares.sum())
-    mean = float(shares @ compliance) / total if total > 0 else 0.0
+    work, total = float(size @ compliance), float(size @ (compliance > 0))
+    if not total > 0:
+        work, total = float(compliance.sum()), float(np.count_nonzero(compliance))
+    mean = work / total if total > 0 else 0.0
     length = max(length, ROUNDED * mean * min(largest, plates))
     if length == 0:
         length = _least_displacement(r, d + w)
@@ -177,8 +177,7 @@ def yardsticks(
     force = force or 1.0  # no force, and none that would make a displacement: any number serves
     if length == 0:
         return Yardsticks(force, 0.0, np.zeros(len(r)))
-    stiff = np.divide(mean, compliance, out=np.ones(len(r)), where=moves)
-    stiff = np.minimum(np.maximum(stiff, 1.0), STIFFEST)
+    stiff = np.minimum(np.maximum(mean * problem.stiffnesses, 1.0), STIFFEST)
     return Yardsticks(force, length, stiff * (force / length))
 
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.linear.operators import InterfaceOperator, asymmetry, diagonal
+from contactopt.linear.operators import asymmetry, diagonal, form, has_entries, row_sizes
 from contactopt.problem.cones import polygon, simplex_steps, unit
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import dimensionless, isotropic
@@ -65,17 +65,15 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infe
         return apart
     problem = isotropic(problem)
     cones = problem.law.unilateral and problem.law.proportional
-    if not cones or isinstance(problem.Q, InterfaceOperator) or problem.contacts == 0:
+    if not cones or not has_entries(problem.Q) or problem.contacts == 0:
         return None
-    entries = problem.Q.nnz if sp.issparse(problem.Q) else problem.Q.size
+    entries = problem.Q.nnz if form(problem.Q) == "sparse" else problem.Q.size
     edges = len(polygon(problem.dim)[0])
     if entries / problem.dim * edges > MOST_ENTRIES or _definite(problem):
         return None
     scaled, scales = dimensionless(problem)
     # without the unit compliance that this form gives components that cannot move
-    held = (
-        np.abs(problem.Q.diagonal()) == 0 if sp.issparse(problem.Q) else ~np.any(problem.Q, axis=1)
-    )
+    held = row_sizes(problem.Q) == 0
     Q = sp.csr_array(scaled.Q)
     Q = sp.csr_array(Q - sp.diags_array(np.where(held, Q.diagonal(), 0.0)))
     ray = _program(scaled, Q, time_limit)
@@ -101,7 +99,7 @@ def held_apart(problem: InterfaceProblem) -> Infeasible | None:
     if problem.law.unilateral or not problem.contacts:
         return None
     Q, law, places = problem.Q, problem.law, problem.coordinates
-    size = diagonal(Q) if isinstance(Q, InterfaceOperator) else abs(Q).sum(axis=1)
+    size = diagonal(Q) if not has_entries(Q) else abs(Q).sum(axis=1)
     moves = (np.asarray(size).ravel() > 0) | np.any(problem.V, axis=1)
     fixed = np.zeros(problem.q.shape, dtype=bool)
     fixed[:, 0] = np.broadcast_to(law.lowest, len(fixed)) == -np.inf
@@ -123,7 +121,7 @@ def held_apart(problem: InterfaceProblem) -> Infeasible | None:
 
 def _definite(problem: InterfaceProblem) -> bool:
     """Whether there is no plate and Q a symmetric array, positive definite far above rounding."""
-    if len(problem.s) or sp.issparse(problem.Q) or asymmetry(problem.Q) > EXACT:
+    if len(problem.s) or form(problem.Q) == "sparse" or asymmetry(problem.Q) > EXACT:
         return False
     try:
         pivots = np.diag(np.linalg.cholesky(problem.Q)) ** 2

@@ -15,7 +15,7 @@ lambda is how far each of them goes, and s are the loads along them, which r mus
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -32,10 +32,13 @@ from contactopt.linear.operators import (
     asymmetry,
     dense,
     diagonal,
+    form,
+    has_entries,
     row_sizes,
     sparse,
 )
 from contactopt.problem.chart import Chart, Pair
+from contactopt.problem.cones import lengths
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.law import Law
 
@@ -110,17 +113,22 @@ class InterfaceProblem:
             )
         law = mu if law is None else law
         law = law if isinstance(law, Law) else Coulomb(law)
-        s = real_array("s", s)
-        places = np.atleast_2d(
-            real_array("coordinates", coordinates) if given(coordinates) else np.arange(float(k))
-        )
+        places = np.arange(float(k))[None]
+        if given(coordinates):
+            places = np.atleast_2d(real_array("coordinates", coordinates))
         arrays = {
             "q": q,
-            "V": _shaped("V", V if s.size else np.zeros((k * dim, 0)), (k * dim, s.size)),
-            "s": _shaped("s", s, (s.size,)),
-            "areas": _shaped("areas", areas if given(areas) else np.ones(k), (k,)),
-            "coordinates": _shaped("coordinates", places, (len(places), k)),
+            "V": np.zeros((k * dim, 0)),
+            "s": np.zeros(0),
+            "areas": _shaped("areas", areas, (k,)) if given(areas) else np.ones(k),
+            "coordinates": places,
         }
+        if np.size(s):
+            s = real_array("s", s)
+            arrays["s"] = _shaped("s", s, (s.size,))
+            arrays["V"] = _shaped("V", V, (k * dim, s.size))
+        if places.shape != (len(places), k):
+            raise InputError(f"coordinates must have shape {(len(places), k)}; got {places.shape}.")
         for array in arrays.values():
             array.setflags(write=False)
         chart = _chart(chart, arrays["coordinates"], (dim - 1, k))
@@ -163,9 +171,8 @@ class InterfaceProblem:
 
     @property
     def _form(self) -> str:
-        form = "sparse" if sp.issparse(self.Q) else "array"
-        form = "by products" if isinstance(self.Q, InterfaceOperator) else form
-        return f"Q {form} of {self.q.size} x {self.q.size}"
+        kind = form(self.Q) if has_entries(self.Q) else "by products"
+        return f"Q {kind} of {self.q.size} x {self.q.size}"
 
     @property
     def contacts(self) -> int:
@@ -189,7 +196,7 @@ class InterfaceProblem:
     def fingerprint(self) -> str:
         """Digest of the problem's data, for caching and for naming it in tables."""
         digest = hashlib.sha256(self.law.digest)
-        implicit = isinstance(self.Q, InterfaceOperator)
+        implicit = not has_entries(self.Q)
         if implicit:
             known = [self.Q @ np.random.default_rng(0).normal(size=self.q.size)]
         else:  # the same for an array and for sparse rows
@@ -207,6 +214,17 @@ class InterfaceProblem:
         return np.asarray(entries.sum(axis=1) / np.maximum(np.count_nonzero(entries, axis=1), 1))
 
     @cached_property
+    def stiffnesses(self) -> np.ndarray:
+        """(k,) 1 over `compliances` [force / length], or 0."""
+        c = self.compliances
+        return np.divide(1.0, c, out=np.zeros(len(c)), where=c > 0)
+
+    @cached_property
+    def gaps(self) -> np.ndarray:
+        """(k,) lengths of q [length]."""
+        return lengths(self.q)
+
+    @cached_property
     def reach(self) -> np.ndarray:
         """(p,) largest entry of every column of V."""
         return np.asarray(np.abs(self.V).max(axis=0, initial=0.0))
@@ -214,12 +232,13 @@ class InterfaceProblem:
     def altered(self, **values: Any) -> InterfaceProblem:
         """The same problem with other values of its fields, which must fit and are not checked."""
         other = object.__new__(InterfaceProblem)
-        other.__dict__.update({f.name: self.__dict__[f.name] for f in fields(self)} | values)
+        other.__dict__.update({name: self.__dict__[name] for name in self.__dataclass_fields__})
+        other.__dict__.update(values)
         return other
 
     def explicit(self) -> InterfaceProblem:
         """The same problem with Q an array. InputError if that would be too large."""
-        return self if isinstance(self.Q, np.ndarray) else self.altered(Q=dense(self.Q))
+        return self if form(self.Q) == "array" else self.altered(Q=dense(self.Q))
 
     def displacements(self, reactions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """The relative displacements u = Q r + V lambda + q (k, dim) [length], normal first."""

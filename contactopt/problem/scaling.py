@@ -10,8 +10,9 @@ import scipy.sparse as sp
 from contactopt.linear.operators import (
     NOISE,
     Interface,
-    InterfaceOperator,
     diagonal,
+    form,
+    has_entries,
     row_sizes,
     turned,
 )
@@ -90,9 +91,9 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     scales, held = scales_of(problem), immovable(problem)
     compliance, columns = scales.length / scales.force, scales.length / scales.multipliers
     Q: Interface
-    if isinstance(problem.Q, InterfaceOperator):
+    if not has_entries(problem.Q):
         Q = problem.Q.scaled(1 / compliance, held.astype(float))
-    elif sp.issparse(problem.Q):
+    elif form(problem.Q) == "sparse":
         rows = problem.Q
         Q = sp.csr_array((rows.data / compliance, rows.indices, rows.indptr), shape=rows.shape)
         if held.any():
@@ -140,7 +141,7 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
     d = np.abs(diagonal(problem.Q))
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
-    if held.any() and not isinstance(problem.Q, InterfaceOperator):
+    if held.any() and has_entries(problem.Q):
         rows = np.flatnonzero(held)
         held[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
     return held

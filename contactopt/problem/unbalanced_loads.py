@@ -238,7 +238,7 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
     if motion.startswith("rotation"):
         return (
             f"the load is more than the contacts can hold: {body} tips over ({motion}); change the"
-            " load or add a support."
+            " load or add a support; contactopt limit finds the load that they hold."
         )
     if found.opens:
         return (
@@ -247,7 +247,8 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
         )
     return (
         f"the load is more than the contacts can hold: {body} slides off ({motion}); press the"
-        " bodies together, or add friction or a support."
+        " bodies together, or add friction or a support; contactopt limit finds the load that they"
+        " hold."
     )
 
 

@@ -38,6 +38,7 @@ class ContactFields:
     gap            (k,) what remains of the gap [length];  slip  (dim, k) tangential motion of upper
                    against lower [length]
     status         (k,) 0 open, 1 stick, 2 slip
+    normals        (k, dim) from the lower to the upper body;  first  (k,) initial gap [length]
     """
 
     name: str
@@ -49,6 +50,8 @@ class ContactFields:
     gap: np.ndarray
     slip: np.ndarray
     status: np.ndarray
+    normals: np.ndarray
+    first: np.ndarray
 
     @property
     def data(self) -> dict[str, np.ndarray]:
@@ -77,7 +80,8 @@ class ContactFields:
         import meshio
 
         cells = [(CELLS[len(self.cells)], self.cells.T)]
-        meshio.Mesh(_tall(self.points), cells, self.data).write(path, file_format="vtu")
+        rest = {"contact_normal": _tall(self.normals.T), "contact_initial_gap": self.first}
+        meshio.Mesh(_tall(self.points), cells, self.data | rest).write(path, file_format="vtu")
 
 
 def _tall(x: np.ndarray) -> np.ndarray:
@@ -121,6 +125,8 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
                 u[own, 0],
                 slip[:, own],
                 state[own],
+                coupling.frames[:, 0],
+                coupling.gap,
             )
         )
     return tuple(made)

@@ -15,7 +15,6 @@ import numpy as np
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
-from contactopt.scenes.scene import Plate
 
 CLOSED = 1e-3  # a mean direction shorter than this is that of a surface around a body
 ROUNDED = 1e-12  # share of the motions of the bodies below which what they make is rounding
@@ -104,4 +103,4 @@ def _along_symmetry(reduction: Reduction, mean: np.ndarray, component: int) -> n
 def _has_plate(part: Any) -> bool:
     """Whether a total force moves a part."""
     loads = getattr(part, "loads", ())
-    return any(isinstance(load, Plate) for load in loads) or bool(getattr(part, "force", None))
+    return any(load.level for load in loads) or bool(getattr(part, "force", None))

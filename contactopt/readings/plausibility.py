@@ -13,7 +13,7 @@ import numpy as np
 from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
 from contactopt.scenes.material_library import STRESSES
-from contactopt.scenes.scene import Part, Plate, Scene, Traction
+from contactopt.scenes.scene import Part, Scene
 
 # of the extent of a surface, up to which a closed gap is small, however fine its facets are
 SHARE = 0.02
@@ -36,8 +36,7 @@ def _unloaded(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
     """A scene in which nothing pushes."""
     given: list[Any] = []
     for part in scene.parts:
-        loads = getattr(part, "loads", ())
-        given += [load.force if isinstance(load, Plate) else load.value for load in loads]
+        given += [load.values(scene.components) for load in getattr(part, "loads", ())]
         given += [support.displacement for support in getattr(part, "supports", ())]
         given += [getattr(part, name, None) for name in ("force", "displacement")]
     values = [list(own.values()) if isinstance(own, Mapping) else own for own in given]
@@ -59,18 +58,14 @@ def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
     """Loads on facets that may touch."""
     notes = []
     for load in part.loads:
-        if isinstance(load, Traction) and np.any(load.value):
-            what = "traction"
-        elif isinstance(load, Plate) and any(load.force.values()):
-            what = "plate"
-        else:
+        if not load.boundary or not any(load.values(scene.components).values()):
             continue
         loaded = np.asarray(part.mesh.boundaries[load.boundary])
         for name in scene.surfaces_of(part):
             shared = len(np.intersect1d(loaded, part.mesh.boundaries[name]))
             if shared:
                 notes.append(
-                    f"the {what} on {load.boundary!r} of body '{part.name}' acts on {shared}"
+                    f"the {load.what} on {load.boundary!r} of body '{part.name}' acts on {shared}"
                     f" facets of {name!r}, which may touch: it acts beside the contact forces, and"
                     " where the surfaces are open; is another boundary meant?"
                 )
@@ -79,14 +74,15 @@ def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
 
 def _faint_loads(scene: Scene, part: Part) -> list[str]:
     """Loads that strain a body by next to nothing."""
-    stresses = [np.abs(load.value).max() for load in part.loads if isinstance(load, Traction)]
     area = float(np.linalg.norm(np.ptp(part.mesh.p, axis=1))) ** (scene.dim - 1)
     depth = scene.thickness if scene.kind == "plane-strain" else 1.0
+    stress = 0.0
     for load in part.loads:
-        if isinstance(load, Plate):
-            force = max((abs(value) for value in load.force.values()), default=0.0)
-            stresses.append(force / (area * depth * scene.copies))
-    strain = max(stresses, default=0.0) / part.material.E
+        if load.boundary:
+            largest = max(map(abs, load.values(scene.components).values()), default=0.0)
+            own = largest / (area * depth * scene.copies) if load.level else largest
+            stress = max(stress, own)
+    strain = stress / part.material.E
     if not 0 < strain < FAINT:
         return []
     return [

@@ -4,7 +4,7 @@ space.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_zone, is_level, stick_width
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.kinds import KINDS
-from contactopt.scenes.scene import BodyForce, Traction
+from contactopt.scenes.loads import Load
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
@@ -162,11 +162,10 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     return found
 
 
-def _prescribed(item: Any, axes: Sequence[str]) -> dict[str, Mapping[str, float]]:
+def _prescribed(item: Any, axes: tuple[str, ...]) -> dict[str, Mapping[str, float]]:
     """What a support, a load or a rigid body prescribes: kind -> component -> value."""
-    if isinstance(item, Traction | BodyForce):
-        kind = "traction" if isinstance(item, Traction) else "weight"
-        return {kind: dict(zip(axes, item.value))}
+    if isinstance(item, Load):
+        return {item.form.partition(":")[0]: item.values(axes)}
     kinds = ("force", "displacement")
     return {kind: given for kind in kinds if (given := getattr(item, kind, None))}
 
@@ -177,7 +176,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     [force], largest pressure [stress], area [length^2], half-widths [length], coupling with its
     reason, and counts of contacts. 'holders': the resultant of each support and plate.
     """
-    pairs = {}
+    pairs, bodies = {}, {pair.name: list(pair.bodies) for pair in reduction.scene.pairs}
     for (view, own), (name, found) in zip(
         views(reduction, solution), pair_resultants(reduction, solution).items()
     ):
@@ -185,6 +184,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
         status, zone = contact_status(problem, r), contact_zone(view.scene, problem, r)
         level = is_level(problem, view.coupling.frames, r)
         pairs[name] = found.table | {
+            "bodies": bodies[name],
             "normal_force": float(r[:, 0].sum()),
             "friction_force": float(lengths(r[:, 1:]).sum()),
             "friction_bound": float(problem.law.bound_along(r).sum()),

@@ -7,16 +7,18 @@ checked by the scene.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_name, check_number, check_size, real_array, short
+from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.meshes.given_curves import Curve
 from contactopt.scenes.kinds import KINDS
+from contactopt.scenes.loads import LOADS, Load
+from contactopt.scenes.loads.load import check_components
 
 Function = Callable[[np.ndarray], np.ndarray]
 
@@ -29,41 +31,20 @@ class Support:
     is a Support that holds the normal component only.
     """
 
+    what = "support"
+    form = "displacement:BODY:BOUNDARY:COMPONENT, or displacement:BODY:COMPONENT of a rigid body,"
     boundary: str
     displacement: Mapping[str, float] | None = None
 
+    def values(self, components: tuple[str, ...]) -> dict[str, float]:
+        """The displacement by component, as Load.values."""
+        return (
+            dict.fromkeys(components, 0.0) if self.displacement is None else {**self.displacement}
+        )
 
-@dataclass(frozen=True)
-class Traction:
-    """Surface force per area on a named boundary, eq (4): one value [stress] per component."""
-
-    boundary: str
-    value: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class BodyForce:
-    """Force per volume: one value [force / length^3] per component."""
-
-    value: tuple[float, ...]
-
-
-@dataclass(frozen=True)
-class Plate:
-    """A rigid plate on a named boundary, loaded by a total force.
-
-    `force` maps each component in which the plate may move to the total force [force] on the whole
-    body (all mirror images, the whole ring). The plate never tilts; its unknown displacement is the
-    multiplier of the force balance. In the other components the body is held if the plate is glued
-    to it, and slides freely if not.
-    """
-
-    boundary: str
-    force: Mapping[str, float]
-    glued: bool = True
-
-
-LOADS = (Traction, BodyForce, Plate)
+    def with_values(self, values: Mapping[str, float]) -> Support:
+        """As Load.with_values."""
+        return replace(self, displacement=dict(values))
 
 
 @dataclass(frozen=True)
@@ -84,7 +65,7 @@ class Part:
     mesh: Any
     material: Material
     supports: tuple[Support, ...] = ()
-    loads: tuple[Traction | BodyForce | Plate, ...] = ()
+    loads: tuple[Load, ...] = ()
     contact: str = "contact"
     curve: Function | Mapping[str, Function] | None = None
     elastic = True
@@ -99,18 +80,18 @@ class Part:
         if not (self.curve is None or callable(self.curve) or isinstance(self.curve, Mapping)):
             must = "its curve must be a function, or a mapping from boundaries to functions"
             raise self._wrong(must, short(self.curve))
-        for what, items, kinds in (
-            ("supports", self.supports, (Support,)),
-            ("loads", self.loads, LOADS),
-        ):
+        known = " or ".join(name for _, name in LOADS.values())
+        rows: tuple[Any, ...] = (
+            ("supports", self.supports, Support, "Support"),
+            ("loads", self.loads, Load, known),
+        )
+        for what, items, kind, names in rows:
             alike = isinstance(items, (tuple, list))
-            if not alike or not all(isinstance(item, kinds) for item in items):
-                names = " or ".join(kind.__name__ for kind in kinds)
+            if not alike or not all(isinstance(item, kind) for item in items):
                 raise self._wrong(f"its {what} must be a tuple of {names} objects", short(items))
-        for item in (*self.supports, *self.loads):
-            boundary = "" if isinstance(item, BodyForce) else item.boundary
-            if not isinstance(boundary, str):
-                raise self._wrong("a boundary is given by its name", short(boundary))
+            for item in items:
+                if not isinstance(item.boundary, str):
+                    raise self._wrong("a boundary is given by its name", short(item.boundary))
 
     def _wrong(self, must: str, got: str) -> InputError:
         return InputError(f"body '{self.name}': {must}; got {got}.")
@@ -121,16 +102,7 @@ class Part:
             held = support.displacement
             check_components(self.name, {} if held is None else held, kind)
         for load in self.loads:
-            if isinstance(load, Plate):
-                check_components(self.name, load.force, kind)
-                continue
-            what, components, value = type(load).__name__, KINDS[kind].components, load.value
-            listed = isinstance(value, (tuple, list, np.ndarray)) and np.iterable(value)
-            if not listed or len(value) != len(components):
-                needs = f"a {what} needs a tuple of {len(components)} values"
-                raise self._wrong(f"{needs} ({', '.join(components)})", short(value))
-            for one in value:
-                check_size(f"every {what} value of body '{self.name}'", one)
+            load.check(self.name, kind)
 
     @property
     def given(self) -> bool:
@@ -297,22 +269,3 @@ def _check_motion(body: Rigid | HalfSpace, kind: str) -> None:
         raise InputError(
             f"body '{body.name}': a component can have a force or a displacement, not both."
         )
-
-
-def check_components(body: str, values: Mapping[str, float], kind: str) -> None:
-    """Raise InputError unless values are given by names of the components of a kind of scene."""
-    components = KINDS[kind].components
-    if not isinstance(values, Mapping):
-        raise InputError(
-            f"body '{body}': a value is given for each component by its name, as in "
-            f"{{{components[-1]!r}: 0.0}}; got {short(values)}."
-        )
-    for component, value in values.items():
-        if component not in components:
-            others = [other for other, own in KINDS.items() if component in own.components]
-            remedy = f", or give the scene kind={others[-1]!r}" if others else ""
-            raise InputError(
-                f"body '{body}': there is no component {component!r}; use {', '.join(components)},"
-                f" which are those of kind {kind!r}{remedy}."
-            )
-        check_size(f"the {component} value of body '{body}'", value)

@@ -15,16 +15,10 @@ from contactopt.scenes.expressions import Expression
 from contactopt.scenes.facing_boundaries import Facing
 from contactopt.scenes.file_surfaces import half_space_shape
 from contactopt.scenes.kinds import KINDS
+from contactopt.scenes.loads import load_classes
+from contactopt.scenes.loads.load import Given
 from contactopt.scenes.material_library import Named, material_of
-from contactopt.scenes.scene import (
-    BodyForce,
-    HalfSpace,
-    Part,
-    Plate,
-    Rigid,
-    Support,
-    Traction,
-)
+from contactopt.scenes.scene import HalfSpace, Part, Rigid, Support
 
 
 @dataclass
@@ -74,6 +68,37 @@ class Reading:
     def components(self) -> tuple[str, ...]:
         return KINDS[self.kind].components
 
+    def vector(self, values: dict[str, float]) -> tuple[float, ...]:
+        """Numbers of components with zeros for the others."""
+        return tuple(values.get(c, 0.0) for c in self.components)
+
+    def numbers(
+        self, table: Table, whole: bool = False, keys: tuple[str, ...] = ()
+    ) -> dict[str, float]:
+        """The numbers of components, or of other `keys`, in a table, of the present state; `whole`:
+        it holds no others.
+        """
+        found = {}
+        for key in keys or self.components:
+            there = table.has(key, float, list)
+            if isinstance(table.data.get(key), list):
+                what = "a number, or an array of the numbers in the states of a load path"
+                values = table.numbers(key, None, what)
+                if not values:
+                    raise table.fail(
+                        f"{key!r} is an empty array; give a number for every state of the load"
+                        " path.",
+                        key,
+                    )
+                if self.state == 0:
+                    self.lengths.append((len(values), table, key))
+                found[key] = self.at_state(values)
+            elif there:
+                found[key] = table.take(key, float)
+        if whole:
+            table.close()
+        return found
+
 
 def read_body(bodies: Table, name: str, reading: Reading) -> Part | Rigid | HalfSpace:
     """The body of a name in the table of bodies, in the present state."""
@@ -90,11 +115,12 @@ def read_body(bodies: Table, name: str, reading: Reading) -> Part | Rigid | Half
     mesh = reading.meshes.setdefault(name, made_mesh)
     made = material_of(body, reading.materials, reading.stress)
     supports = tuple(_support(table, mesh, reading) for table in body.tables("supports"))
-    loads: list[Any] = [_traction(table, mesh, reading) for table in body.tables("tractions")]
-    loads += [_plate(table, mesh, reading) for table in body.tables("plates")]
-    force = body.table("body_force")
-    if force is not None:
-        loads.append(BodyForce(vector_of(components_of(force, reading, whole=True), reading)))
+    loads = []
+    for key, kind in load_classes().items():
+        for table in filter(None, [body.table(key)]) if kind.single else body.tables(key):
+            boundary = "" if kind.single else _boundary(table, "boundary", mesh)
+            loads.append(kind.read(Given(table, boundary, reading)))
+            table.close()
     contact = body.take("contact", str, "contact")
     if body.has("contact"):
         _boundary(body, "contact", mesh)
@@ -122,14 +148,13 @@ def _motions(table: Table, reading: Reading) -> dict[str, Any]:
     """The total force and the displacement of a body that moves as a whole."""
     given = {key: table.table(key) for key in ("force", "displacement")}
     return {
-        key: None if own is None else components_of(own, reading, whole=True)
-        for key, own in given.items()
+        key: None if own is None else reading.numbers(own, whole=True) for key, own in given.items()
     }
 
 
 def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
     normal, motions = table.table("normal"), _motions(table, reading)
-    values = None if normal is None else components_of(normal, reading, whole=True)
+    values = None if normal is None else reading.numbers(normal, whole=True)
     if values is not None and not any(values.values()):
         raise table.fail(
             "the normal is zero; give the direction that points out of the rigid body.", "normal"
@@ -138,65 +163,16 @@ def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
     table.close()
     return Rigid(
         name,
-        None if values is None else vector_of(values, reading),
+        None if values is None else reading.vector(values),
         (lambda x: np.full(x.shape[1], gap)) if isinstance(gap, (int, float)) else gap,
         **motions,
     )
 
 
 def _support(table: Table, mesh: Any, reading: Reading) -> Support:
-    boundary, values = _boundary(table, "boundary", mesh), components_of(table, reading)
+    boundary, values = _boundary(table, "boundary", mesh), reading.numbers(table)
     table.close()
     return Support(boundary, values or None)
-
-
-def _traction(table: Table, mesh: Any, reading: Reading) -> Traction:
-    boundary, values = _boundary(table, "boundary", mesh), components_of(table, reading)
-    if not values:
-        raise table.fail(
-            f"a traction needs a value for at least one of {', '.join(reading.components)}."
-        )
-    table.close()
-    return Traction(boundary, vector_of(values, reading))
-
-
-def _plate(table: Table, mesh: Any, reading: Reading) -> Plate:
-    boundary, force = _boundary(table, "boundary", mesh), table.table("force")
-    if force is None:
-        raise table.fail(
-            f"a plate needs force = {{ {reading.components[-1]} = ... }}: the total force on the"
-            " whole body."
-        )
-    glued = table.take("glued", bool, True)
-    table.close()
-    return Plate(boundary, components_of(force, reading, whole=True), glued)
-
-
-def vector_of(values: dict[str, float], reading: Reading) -> tuple[float, ...]:
-    return tuple(values.get(c, 0.0) for c in reading.components)
-
-
-def components_of(table: Table, reading: Reading, whole: bool = False) -> dict[str, float]:
-    """The numbers of components in a table, of the present state; `whole`: it holds no others."""
-    found = {}
-    for key in reading.components:
-        there = table.has(key, float, list)
-        if isinstance(table.data.get(key), list):
-            what = "a number, or an array of the numbers in the states of a load path"
-            values = table.numbers(key, None, what)
-            if not values:
-                raise table.fail(
-                    f"{key!r} is an empty array; give a number for every state of the load path.",
-                    key,
-                )
-            if reading.state == 0:
-                reading.lengths.append((len(values), table, key))
-            found[key] = reading.at_state(values)
-        elif there:
-            found[key] = table.take(key, float)
-    if whole:
-        table.close()
-    return found
 
 
 def _boundary(table: Table, key: str, mesh: Any) -> str:
@@ -216,7 +192,7 @@ def _curve(table: Table | None, reading: Reading) -> Callable[[np.ndarray], np.n
     radius, place = table.take("radius", float, needed=True, low=0.0), table.table("centre")
     centre = dict.fromkeys(reading.components, 0.0)
     if place is not None:
-        centre = components_of(place, reading, whole=True)
+        centre = reading.numbers(place, whole=True)
     table.close()
     axes = [reading.components.index(c) for c in centre]
     middle = np.array(list(centre.values()))[:, None]

@@ -30,28 +30,17 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
-from contactopt.scenes.scene import BodyForce, Plate, Scene, Support, Traction
+from contactopt.scenes.body_kinds import Support
+from contactopt.scenes.loads import Load, load_classes
+from contactopt.scenes.scene import Scene
 
 MATERIAL = ("E", "nu")
-LOADS = ("force", "displacement", "traction", "weight")
 FIELDS = ("gap", "friction")
+# of what holds and loads bodies
 FORM = {
-    "force": "force:BODY:COMPONENT",
-    "displacement": (
-        "displacement:BODY:BOUNDARY:COMPONENT, or displacement:BODY:COMPONENT of a rigid body,"
-    ),
-    "traction": "traction:BODY:BOUNDARY:COMPONENT",
-    "weight": "weight:BODY:COMPONENT",
+    form.partition(":")[0]: form
+    for form in (Support.form, *(load.form for load in load_classes().values()))
 }
-
-
-ITEMS: dict[str, Any] = {
-    "force": Plate,
-    "displacement": Support,
-    "traction": Traction,
-    "weight": BodyForce,
-}
-Entry = tuple[str, Mapping[str, float]]  # name of a field, and its components
 
 
 @dataclass(frozen=True)
@@ -74,7 +63,7 @@ class Parameter:
 
     def concerns(self, part: Any) -> bool:
         """Whether it is a constant of the material of that body, or one of its loads."""
-        return self.kind in (*MATERIAL, *LOADS) and self.owner in ("", part.name)
+        return self.kind in (*MATERIAL, *FORM) and self.owner in ("", part.name)
 
     def read(self, scene: Scene) -> float:
         """Its value in a scene; InputError where it does not enter."""
@@ -138,43 +127,37 @@ class Parameter:
         changes = {}
         for name in ("supports", "loads"):
             items = getattr(part, name)
-            rows = [self._in_item(item, self._entry(item, scene), value) for item in items]
+            rows = [self._in_item(item, self._held(item, scene), value) for item in items]
             found += [known for own, _ in rows for known in own]
             changes[name] = tuple(item for _, item in rows)
         return found, replace(part, **changes) if found and value is not None else part
 
-    def _in_item(self, item: Any, entry: Entry | None, value: float | None) -> tuple[list, Any]:
-        """Its value in what holds or loads a body, and that with another value."""
-        if entry is None or self.component not in entry[1]:
+    def _in_item(
+        self, item: Any, held: Mapping[str, float], value: float | None
+    ) -> tuple[list[float], Any]:
+        """Its value in what holds or loads a body by component, and that with another value."""
+        if self.component not in held:
             return [], item
-        field, held = entry
         if value is not None:
             made = dict(held) | {self.component: value}
-            item = replace(item, **{field: tuple(made.values()) if field == "value" else made})
+            whole = not hasattr(item, "boundary")  # a body
+            item = replace(item, **{self.kind: made}) if whole else item.with_values(made)
         return [float(held[self.component])], item
 
-    def _held_as_one(self, part: Any) -> Entry | None:
-        """The field of a rigid body or a half-space that holds the parameter."""
+    def _held_as_one(self, part: Any) -> Mapping[str, float]:
+        """The force or the displacement of a rigid body or a half-space, if it is one of them."""
         force, held = part.force or {}, part.displacement or {}
         if self.kind == "force":
-            return "force", force
+            return dict(force)
         if self.kind != "displacement" or self.boundary or self.component in force:
-            return None
-        return "displacement", {self.component: 0.0} | dict(held)
+            return {}
+        return {self.component: 0.0} | dict(held)
 
-    def _entry(self, item: Any, scene: Scene) -> Entry | None:
-        """The field of a support or load that holds the parameter; None if it is another one."""
-        there = self.boundary == getattr(item, "boundary", "")
-        if not isinstance(item, ITEMS[self.kind]):
-            return None
-        if self.kind == "force":
-            return ("force", item.force) if there or not self.boundary else None
-        if not there:
-            return None
-        if self.kind == "displacement":
-            fixed = dict.fromkeys(scene.components, 0.0)
-            return "displacement", fixed if item.displacement is None else item.displacement
-        return "value", dict(zip(scene.components, item.value))
+    def _held(self, item: Support | Load, scene: Scene) -> Mapping[str, float]:
+        """The values of a support or load by component, if it is one of them."""
+        there = self.boundary in (item.boundary, "" if self.kind == "force" else item.boundary)
+        own = item.form.partition(":")[0] == self.kind
+        return item.values(scene.components) if own and there else {}
 
     def _missing(self, scene: Scene) -> str:
         named: Any = scene.pairs if self.kind == "mu" else scene.parts
@@ -205,7 +188,7 @@ def parameter(name: Any, scene: Scene) -> Parameter:
         return Parameter(name, kind)
     if kind in (*MATERIAL, "mu") and len(rest) <= 1:
         made = Parameter(name, kind, *rest)
-    elif kind in LOADS and len(rest) in (2, 3):
+    elif kind in FORM and len(rest) in (2, 3):
         made = Parameter(name, kind, rest[0], rest[1] if len(rest) == 3 else "", rest[-1])
         if made.component not in scene.components:
             raise InputError(

@@ -14,18 +14,12 @@ import numpy as np
 
 from contactopt.checks import check_number, check_size, short
 from contactopt.errors import InputError
-from contactopt.scenes.body_kinds import (
-    Body,
-    BodyForce,
-    HalfSpace,
-    Part,
-    Plate,
-    Rigid,
-    Support,
-    Traction,
-)
+from contactopt.scenes.body_kinds import Body, HalfSpace, Part, Rigid, Support
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.kinds import KINDS, Kind
+from contactopt.scenes.loads.body_force import BodyForce
+from contactopt.scenes.loads.plate import Plate
+from contactopt.scenes.loads.traction import Traction
 
 __all__ = [
     "BodyForce",

@@ -21,7 +21,7 @@ from contactopt.problem.laws import LAWS
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
-from contactopt.scenes.file_bodies import Reading, components_of, function_of, read_body
+from contactopt.scenes.file_bodies import Reading, function_of, read_body
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, library, read_materials
 from contactopt.scenes.scene import Scene
@@ -215,9 +215,7 @@ def _free(part: Any) -> Any:
     loads, and are not the whole surface where there are others.
     """
     named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
-    used = [
-        named[own.boundary] for own in (*part.supports, *part.loads) if hasattr(own, "boundary")
-    ]
+    used = [named[own.boundary] for own in (*part.supports, *part.loads) if own.boundary]
     taken = np.concatenate([np.zeros(0, dtype=int), *used])
     whole = len(part.mesh.boundary_facets())
     free = {name: own for name, own in named.items() if not np.isin(own, taken).any()}
@@ -249,8 +247,7 @@ def _contact(table: Table, parts: list[Any], reading: Reading) -> Contact:
     given: dict[str, Any] = {key: value for key, value in texts.items() if value is not None}
     way = table.table("direction")
     if way is not None:
-        values = components_of(way, reading, whole=True)
-        given["direction"] = tuple(values.get(c, 0.0) for c in reading.components)
+        given["direction"] = reading.vector(reading.numbers(way, whole=True))
     with table.about():
         upper, lower = (table.take(side, str, needed=True) for side in SIDES)
         made = Contact(upper, lower, mu, **given)

@@ -15,7 +15,7 @@ import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
-from contactopt.scenes.scene import Part, Plate, Rigid, Scene, Support
+from contactopt.scenes.scene import Part, Rigid, Scene, Support
 from contactopt.simplification.constants import NEAR
 from contactopt.simplification.images import Images, Plane
 from contactopt.simplification.proof import Fold, Key
@@ -133,14 +133,15 @@ def _doubled(values: Any) -> Any:
     return {name: 2 * value for name, value in values.items()} if values else values
 
 
+def _of_both(load: Any) -> Any:
+    """A load that stands for two: a plate has the force of all images."""
+    return load.with_values(_doubled(load.force)) if load.level else load
+
+
 def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component: str) -> Part:
     name, own = part.name, whole.meshes[part.name].boundaries or {}
     if images.bodies[name] != name:
-        loads: list[Any] = [
-            replace(load, force=_doubled(load.force)) if isinstance(load, Plate) else load
-            for load in part.loads
-        ]
-        return replace(part, loads=tuple(loads))
+        return replace(part, loads=tuple(map(_of_both, part.loads)))
     cut = f"symmetry {component}"
     while cut in own:
         cut += "'"
@@ -150,17 +151,15 @@ def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component
 
     supports = [item for item in part.supports if there(item.boundary)]
     supports.append(Support(cut, {component: 0.0}))
-    loads = []
+    loads: list[Any] = []
     for number, load in enumerate(part.loads):
-        if not isinstance(load, Plate):
-            if not hasattr(load, "boundary") or there(load.boundary):
-                loads.append(load)
-        elif (name, number) in images.own:
-            loads.append(replace(load, force=_without(load.force, component)))
+        if not load.level or (name, number) not in images.own:
+            if not load.boundary or there(load.boundary):
+                loads.append(_of_both(load))
+        else:
+            loads.append(load.with_values(_without(load.force, component)))
             if component in load.force and not load.glued:
                 supports.append(Support(load.boundary, {component: 0.0}))
-        elif there(load.boundary):
-            loads.append(replace(load, force=_doubled(load.force)))
     surfaces = [surface for surface in whole.scene.surfaces_of(part) if there(surface)]
     curves = {surface: part.curve_of(surface) for surface in surfaces}
     return replace(

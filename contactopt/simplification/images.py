@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import Part, Plate, Support
+from contactopt.scenes.scene import Part
 from contactopt.simplification.constants import EQUAL, NEAR, ROUNDED
 from contactopt.simplification.whole import Whole
 
@@ -152,14 +152,9 @@ def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
         yield _Condition("normal", "", whole, normal / (np.linalg.norm(normal) or 1.0), None)
         return
     for item in (*part.supports, *part.loads):
-        where, kind = getattr(item, "boundary", ""), type(item).__name__.lower()
-        if isinstance(item, (Support, Plate)):
-            values = item.displacement if isinstance(item, Support) else item.force
-            kind += "" if getattr(item, "glued", True) else " that slides"
-            yield _Condition(kind, where, *held_space(components, values), item)
-        else:
-            kind = kind.replace("bodyforce", "force per volume")
-            yield _Condition(kind, where, whole, np.array(item.value, float), item)
+        kind = item.what + ("" if getattr(item, "glued", True) else " that slides")
+        space = held_space(components, item.values(components))
+        yield _Condition(kind, item.boundary, *space, item)
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +207,7 @@ class _Comparison:
                     and np.all(np.abs(H @ one.values - two.values) <= EQUAL * size)
                 )
                 if same and (not one.where or self.fits(part.name, one.where, two.where)):
-                    if one.item is two.item and isinstance(one.item, Plate):
+                    if one.item is two.item and getattr(one.item, "level", False):
                         found.add((part.name, part.loads.index(one.item)))
                     break
             else:

@@ -17,7 +17,7 @@ import numpy as np
 import skfem
 from scipy.spatial import KDTree
 
-from contactopt.scenes.scene import BodyForce, Plate, Scene
+from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import NEAR, ROUNDED
 from contactopt.simplification.findings import Simplification
 from contactopt.simplification.images import equal_functions
@@ -104,11 +104,9 @@ def _spoils(prism: _Prism) -> str:
         if len(ends):
             return f"the ends of body '{name}' are not held along the axis"
         for load in part.loads:
-            force = load.force.get(component) if isinstance(load, Plate) else load.value[prism.axis]
-            if force:
-                kind = type(load).__name__.lower()
-                where = "" if isinstance(load, BodyForce) else f" on {load.boundary!r}"
-                return f"the {kind}{where} of body '{name}' acts along the axis"
+            if load.values(whole.scene.components).get(component):
+                where = f" on {load.boundary!r}" if load.boundary else ""
+                return f"the {load.what}{where} of body '{name}' acts along the axis"
     for pair in whole.scene.pairs:
         gaps = [whole.rigid[name].gap for name in pair.bodies if name in whole.rigid]
         functions = [function for function in (pair.mu, *gaps) if function is not None]
@@ -166,12 +164,11 @@ def _flattened(prism: _Prism) -> Scene:
             for support in part.supports
             if support.boundary in there and values(support.displacement) != {}
         ]
-        loads: list[Any] = []
-        for load in part.loads:
-            if isinstance(load, Plate) and load.boundary in there:
-                loads.append(replace(load, force=values(load.force)))
-            elif isinstance(load, BodyForce) or load.boundary in there:
-                loads.append(replace(load, value=tuple(load.value[axis] for axis in axes)))
+        loads = [
+            load.with_values(values(load.values(scene.components)))
+            for load in part.loads
+            if not load.boundary or load.boundary in there
+        ]
         found = {name: part.curve_of(name) for name in scene.surfaces_of(part)}
         curves = {name: curve(function) for name, function in found.items() if function is not None}
         made = replace(part, supports=tuple(supports), loads=tuple(loads), curve=curves or None)

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem
 
 PATIENCE = 2.0  # seconds of a solve about which nothing is said
@@ -29,15 +29,15 @@ def progress_lines(
     """
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []
-    form = problem.Q.coupled if isinstance(problem.Q, InterfaceOperator) else None
-    first = 0 if form is None else form.cycles
+    bodies = problem.Q.coupled if form(problem.Q) == "bodies" else None
+    first = 0 if bodies is None else bodies.cycles
 
     def progress(iteration: int, residual: float) -> None:
         spent = time.perf_counter() - begin
         before.append((spent, residual))
         if spent < PATIENCE:
             return
-        cycles = "" if form is None else f", {form.cycles - first} V-cycles of each body"
+        cycles = "" if bodies is None else f", {bodies.cycles - first} V-cycles of each body"
         say(
             f"step {iteration}: residual {residual:.1e}{cycles}, {spent:.0f} s,"
             f" {_peak_memory() / 2**30:.1f} GiB" + remaining(before, tol)

@@ -65,4 +65,7 @@ def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
     if before:
         held = held if np.isnan(most) else f"and it held up to about {most:.6g} {force} in {before}"
         held += f"; numbers and files are those of {before}"
-    return f"{state} slides, every touching contact slips: {load}, {held}"
+    return (
+        f"{state} slides, every touching contact slips: {load}, {held}; contactopt limit finds the"
+        " load that friction bears"
+    )

@@ -19,8 +19,7 @@ from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.linear.budget import NextBest, TooDear, open_budget
-from contactopt.linear.convolution import Convolution
-from contactopt.linear.operators import InterfaceOperator, loosened
+from contactopt.linear.operators import form, loosened
 from contactopt.methods.auto import Auto
 from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
@@ -170,7 +169,7 @@ def _one_way(
     coarse: dict[str, float] = {}
     Q = reduction.problem.Q
     # half-spaces have coarse grids of their own
-    products = isinstance(Q, InterfaceOperator) and not isinstance(Q, Convolution) and not Q.coupled
+    products = form(Q) == "products"
     coarser = elements // FACTOR[scene.dim]
     first = options.restart.start(reduction) if options.restart and start is None else None
     if start is None and first is None and products and not scene.given and coarser >= COARSEST:

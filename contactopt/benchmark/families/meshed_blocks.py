@@ -10,9 +10,8 @@ from contactopt.benchmark.families.of_scenes import problem_of
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.problem import InterfaceProblem
-from contactopt.scenes.body_kinds import BodyForce, Part, Support
 from contactopt.scenes.contact import Contact
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import BodyForce, Part, Scene, Support
 
 
 def meshed_blocks(

@@ -7,9 +7,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import form, has_entries
 from contactopt.methods.diagnosis import diagnose
 from contactopt.problem import InterfaceProblem, infeasibility
 
@@ -36,14 +35,14 @@ def tags_of(problem: InterfaceProblem) -> dict[str, Any]:
     """The tags of a problem, by the keys of TAGS. None stands for what was not computed because the
     problem is large, or because its law or its form does not allow it.
     """
-    products = isinstance(problem.Q, InterfaceOperator)
+    products = not has_entries(problem.Q)
     tags: dict[str, Any] = {
         "dim": problem.dim,
         "contacts": problem.contacts,
         "motions": len(problem.s),
         "law": type(problem.law).__name__.lower(),
         "mu": float(problem.mu.max(initial=0.0)),
-        "form": "products" if products else "sparse" if sp.issparse(problem.Q) else "dense",
+        "form": "products" if products else "sparse" if form(problem.Q) == "sparse" else "dense",
         "symmetric": bool(problem.symmetric),
         "feasible": products or infeasibility(problem) is None,
     }

@@ -1,7 +1,7 @@
-// A picture of triangles, lines and dots in a canvas, with a depth buffer of its own. It asks no graphics card, so that every browser shows the same.
+// A picture of triangles, lines and dots in a canvas, with a depth buffer of its own.
 const PALETTES = {
+  heat: ["f3ece0", "fdd8a8", "fdbb84", "fc8d59", "ef6548", "d7301f", "b30000", "7f0000"],
   viridis: ["440154", "472d7b", "3b528b", "2c728e", "21918c", "28ae80", "5ec962", "addc30", "fde725"],
-  cividis: ["00224e", "123570", "3b496c", "575d6d", "707173", "8a8678", "a59c74", "c3b369", "e1cc55", "fee838"],
 };
 
 function palette(colours, bands = false) {  // 256 colours as bytes, between the given ones or in bands
@@ -12,25 +12,33 @@ function palette(colours, bands = false) {  // 256 colours as bytes, between the
   });
 }
 
+const MOST_PIXELS = 1.2e7;  // of one picture, 150 MB
+
 class Painter {
   constructor(canvas) { this.canvas = canvas; this.context = canvas.getContext("2d", {willReadFrequently: true}); }
 
-  wanted() {  // pixels per pixel of the page, width and height of the canvas as it is on the screen
-    const dense = Math.min(window.devicePixelRatio || 1, 2);
-    return [dense, ...[this.canvas.clientWidth, this.canvas.clientHeight].map((length) => Math.max(1, Math.round(length * dense)))];
+  wanted(moving) {  // canvas per page pixel; painted per canvas pixel, whose means are shown; the size
+    const ratio = moving ? 1 : Math.min(window.devicePixelRatio || 1, 2), size = [this.canvas.clientWidth, this.canvas.clientHeight].map((length) => Math.max(1, Math.round(length * ratio)));
+    return [ratio, moving || 4 * size[0] * size[1] > MOST_PIXELS ? 1 : 2, ...size];
   }
 
-  fits() { const [, width, height] = this.wanted(); return width === this.width && height === this.height; }
+  fits() { const [, , ...size] = this.wanted(false); return size[0] === this.canvas.width && size[1] === this.canvas.height; }
 
-  begin() {  // an empty picture, as large as the canvas is
-    const [dense, width, height] = this.wanted();
-    if (!this.fits()) {
-      Object.assign(this, {width, height, depth: new Float32Array(width * height), owner: new Int32Array(width * height), image: this.context.createImageData(width, height)});
-      this.pixels = new Uint32Array(this.image.data.buffer);
-      Object.assign(this.canvas, {width, height});
+  begin(moving) {  // an empty picture, as large as the canvas is
+    const [ratio, fine, wide, tall] = this.wanted(moving), width = wide * fine, height = tall * fine, many = width * height;
+    if (!(this.room?.length >= many)) Object.assign(this, {room: new Float32Array(many), owners: new Int32Array(many), colours: new Uint32Array(many)});
+    if (wide !== this.image?.width || tall !== this.image.height) {
+      this.image = this.context.createImageData(wide, tall);
+      Object.assign(this.canvas, {width: wide, height: tall});
     }
-    this.dense = dense;
+    Object.assign(this, {ratio, fine, width, height, dense: ratio * fine, depth: this.room.subarray(0, many), owner: this.owners.subarray(0, many), pixels: this.colours.subarray(0, many)});
     this.depth.fill(-Infinity); this.owner.fill(-1); this.pixels.fill(0xffffffff);
+  }
+
+  resolve() {  // the painted pixels as those of the canvas
+    const {pixels, width, fine, image} = this, shown = new Uint32Array(image.data.buffer), mean = (a, b) => (a & b) + (((a ^ b) & 0xfefefefe) >>> 1);
+    if (fine === 1) { shown.set(pixels); return; }
+    for (let y = 0, k = 0; y < image.height; y++) for (let x = 0, i = 2 * y * width; x < image.width; x++, i += 2) shown[k++] = mean(mean(pixels[i], pixels[i + 1]), mean(pixels[i + width], pixels[i + width + 1]));
   }
 
   look(axes, centre, scale, middle) {  // unit vectors to the right, up and to the eye; the point in the middle [pixels of the page]
@@ -115,26 +123,40 @@ class Painter {
     }
   }
 
+  ribbon([px, py, pz], pairs, wide) {  // lines in the plane as triangles: their places, corners, and the node behind each corner
+    const many = pairs.length / 2, places = [0, 1, 2].map(() => new Float64Array(4 * many)), cells = [], from = [];
+    for (let i = 0; i < many; i++) {
+      const [a, b] = [pairs[2 * i], pairs[2 * i + 1]], dx = px[b] - px[a], dy = py[b] - py[a], half = (wide * this.dense) / 2 / (Math.hypot(dx, dy) || 1);
+      [a, a, b, b].forEach((node, k) => { const side = k % 2 ? half : -half; places[0][4 * i + k] = px[node] - side * dy; places[1][4 * i + k] = py[node] + side * dx; places[2][4 * i + k] = pz[node]; from.push(node); });
+      cells.push(4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 1, 4 * i + 3, 4 * i + 2);
+    }
+    return {places, cells, from};
+  }
+
   end([left, right, top, bottom]) {  // shows the picture within these limits; from here the context draws in pixels of the page
+    this.resolve();
     this.context.setTransform(1, 0, 0, 1, 0, 0);
     this.context.fillStyle = "#fff";
     this.context.fillRect(0, 0, this.width, this.height);
-    this.context.putImageData(this.image, 0, 0, ...[left, top, right - left, bottom - top].map((value) => Math.round(value * this.dense)));
-    this.context.setTransform(this.dense, 0, 0, this.dense, 0, 0);
+    this.context.putImageData(this.image, 0, 0, ...[left, top, right - left, bottom - top].map((value) => Math.round(value * this.ratio)));
+    this.context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
   }
 
-  text(words, x, y, align = "center", halo = true) {
+  text(words, x, y, align = "center") {
     const {context} = this;
-    Object.assign(context, {font: "12px system-ui, sans-serif", textAlign: align, textBaseline: "middle", fillStyle: "#1b1b1b", strokeStyle: "#fff", lineWidth: 3});
-    if (halo) context.strokeText(words, x, y);
+    Object.assign(context, {font: "12px -apple-system, 'Segoe UI', Helvetica, Arial, sans-serif", textAlign: align, textBaseline: "middle", fillStyle: "#1b1b1b", strokeStyle: "#fff", lineWidth: 3});
+    const wide = context.measureText(words).width, before = wide * {left: 0, center: 0.5, right: 1}[align];  // no word is cut
+    x = Math.max(before + 2, Math.min(this.width / this.dense - 2 - wide + before, x));
+    context.strokeText(words, x, y);
     context.fillText(words, x, y);
   }
 
-  stroke(points, colour, width) {
+  stroke(points, colour, width, fill = "") {
     const {context} = this;
     Object.assign(context, {strokeStyle: colour, lineWidth: width, lineCap: "round"});
     context.beginPath();
     points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
+    if (fill) { context.fillStyle = fill; context.fill(); }
     context.stroke();
   }
 
@@ -147,9 +169,9 @@ class Painter {
   }
 
   bar(words, {table, low, high, names}, y) {  // of the colours, with ticks
-    const {context} = this, wide = this.width / this.dense, left = 0.06 * wide, length = 0.88 * wide;
+    const {context} = this, wide = this.width / this.dense, length = Math.min(0.88 * wide, names ? 130 * names.length : 480), left = (wide - length) / 2;
     for (let i = 0; i < length; i++) { const n = 3 * Math.floor((255 * i) / length); context.fillStyle = `rgb(${table[n]},${table[n + 1]},${table[n + 2]})`; context.fillRect(left + i, y, 1.5, 10); }
     this.text(words, wide / 2, y - 9);
-    for (const value of names ? names.keys() : ticks(low, high, wide > 600 ? 7 : 4)) this.text(names ? names[value] : short(value), left + (length * (value - low)) / (high - low), y + 19);
+    for (const value of names ? names.keys() : ticks(low, high, length > 400 ? 6 : 4)) this.text(names ? names[value] : short(value), left + (length * (value - low)) / (high - low), y + 19);
   }
 }

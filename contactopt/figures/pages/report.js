@@ -2,7 +2,7 @@ const data = JSON.parse(await unsqueezed("data"));
 const get = (id) => document.getElementById(id);
 const GREY = "#bbbbbb", MOST = 500;  // rows of a table at a time
 const runs = data.points.map((row) => ({...Object.fromEntries(data.columns.map((name, i) => [name, row[i]])), method: data.methods[row[1]], problem: data.problems[row[0]].name}));
-const short = (value) => value === null || value === undefined ? "-" : typeof value === "boolean" ? (value ? "yes" : "no") : typeof value === "number" ? (Number.isInteger(value) ? String(value) : Math.abs(value) < 1e-3 ? value.toExponential(1) : value.toPrecision(3).replace(/(\.\d*?)0+(?=e|$)/, "$1").replace(/\.(?=e|$)/, "")) : String(value);
+const short = (value) => typeof value === "boolean" ? (value ? "yes" : "no") : typeof value === "number" && !Number.isInteger(value) ? String(Number(value.toPrecision(3))) : String(value ?? "-");
 const plainly = (value) => typeof value === "number" ? value.toExponential(0) : value;
 const leaders = () => data.leaders.find((one) => one.group === get("group").value && String(one.accuracy) === get("accuracy").value);
 const index = () => data.accuracies.findIndex((value) => String(value) === get("accuracy").value);
@@ -12,6 +12,7 @@ function colour(method) {  // the first leaders of these problems have a colour,
   return place < data.colours.length ? data.colours[place] : GREY;
 }
 
+const RUN = [["method", "method", "solver"], ["asked", "tolerance"], ["certificate", "residual"], ["claimed", "claimed"], ["status", "status"], ["CPU [s]", "cpu"], ["lower quartile", "low"], ["upper quartile", "high"], ["wall [s]", "wall"], ["memory [MB]", "memory"], ["repeats", "repeats"]];
 const LOGS = {x: "log", y: "log"}, look = (method) => ({name: method, ink: colour(method), wide: colour(method) === GREY ? 1.2 : 2});
 
 function link(kind, name) {
@@ -85,14 +86,14 @@ function drawProblem(name) {
   const named = data.order.filter((method) => own.some((run) => run.method === method));
   chart(get("speed"), named.map((method) => { const same = own.filter((run) => run.method === method); return {...look(method), x: same.map((run) => run.cpu), y: same.map((run) => run.residual ?? 0), dots: (i) => ({words: `${method}: ${short(same[i].residual)} after ${short(same[i].cpu)} s`})}; }), "CPU time [s]", "certificate [-]", LOGS);
   chart(get("convergence"), data.histories.filter((one) => one[0] === p).map((one) => ({...look(data.methods[one[1]]), x: one[3], y: one[2]})), "time [s]", "certificate [-]", LOGS);
-  table("of-problem", [["method", "method", "solver"], ["asked", "tolerance"], ["certificate", "residual"], ["claimed", "claimed"], ["status", "status"], ["CPU [s]", "cpu"], ["lower quartile", "low"], ["upper quartile", "high"], ["wall [s]", "wall"], ["memory [MB]", "memory"], ["repeats", "repeats"]], own);
+  table("of-problem", RUN, own);
 }
 
 function drawRuns() {
   const words = get("words").value.toLowerCase();
   const shown = runs.filter((run) => ["method", "status", "tolerance"].every((name) => !get(`filter-${name}`).value || String(run[name]) === get(`filter-${name}`).value) && (!words || `${run.problem} ${run.method}`.toLowerCase().includes(words)));
   get("count").textContent = `${shown.length} of ${runs.length} runs, each with its repeats` + (shown.length > MOST ? `; the first ${MOST} are shown` : "");
-  table("runs", [["problem", "problem", "problem"], ["method", "method", "solver"], ["asked", "tolerance"], ["certificate", "residual"], ["claimed", "claimed"], ["status", "status"], ["CPU [s]", "cpu"], ["lower quartile", "low"], ["upper quartile", "high"], ["wall [s]", "wall"], ["memory [MB]", "memory"], ["repeats", "repeats"]], shown);
+  table("runs", [["problem", "problem", "problem"], ...RUN], shown);
 }
 
 function options(id, values, draw, first = null) {

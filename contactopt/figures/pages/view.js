@@ -1,21 +1,22 @@
 const data = JSON.parse(await unsqueezed("data"));
 const [LENGTH, STRESS, FORCE] = data.units;
 const flat = data.dim === 2;
-const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value.type ? unpack(value) : value]));
+const opened = (item) => Object.fromEntries(Object.entries(item).map(([name, value]) => [name, value?.type ? unpack(value) : value]));
 const bodies = data.bodies.map((body) => ({...opened(body), values: opened(body.values), shown: true, corners: body.inside.shape[1]}));
 const contacts = data.contacts.map((pair) => ({...opened(pair), states: opened(pair.states), shown: !pair.hidden, corners: 4, inside: [], cut_cells: []}));
+bodies.forEach((body, index) => { body.values.body ??= new Float32Array(body.points.length / 3).fill(index); });
 const CONTACT = data.words ?? {  // those of a scene that nobody has solved yet, or of a result
   pressure: ["pressure", STRESS], traction: ["size of the tangential traction", STRESS], status: ["stick, slip, open", ""],
   gap: ["gap", LENGTH], slip: ["size of the slip", LENGTH],
 };
 const STATUS = ["open", "stick", "slip"];
-const now = {field: data.words ? "body" : "von_mises", scale: data.scale, contact: Object.keys(CONTACT)[0], state: data.states - 1, arrows: true, clear: false, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, box: data.near, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38};
+const now = {field: "body", scale: data.scale, contact: Object.keys(CONTACT)[0], state: data.states - 1, arrows: flat || Boolean(data.words), clear: true, edges: true, lines: false, whole: true, cut: "", place: 0.5, probe: null, focus: 0};
 const view = document.getElementById("view");
 let charted = false;
 const control = (name) => document.getElementById(name);
 
 function label(name) {
-  if (name === "body") return name;
+  if (name === "body") return "bodies";
   if (name === "von_mises") return `von Mises stress [${STRESS}]`;
   if (name.startsWith("stress_")) return `stress ${name.slice(7)} [${STRESS}]`;
   return (name === "size" ? "size of the displacement" : `displacement ${name.slice(5)}`) + ` [${LENGTH}]`;
@@ -27,8 +28,8 @@ function at(values, length) {  // those of the state shown, of all that there ar
   return values.length === length ? values : values.subarray(now.state * length, (now.state + 1) * length);
 }
 
-const state = (pair, name) => at(pair.states[name], count(pair) * (name === "vector" ? 3 : 1));
-const bodyNames = data.words ? ["body"] : bodies.length ? ["von_mises", "size", ...data.axes.map((axis) => `move_${axis}`), ...Object.keys(bodies[0].values).filter((name) => name.startsWith("stress_"))] : [];
+const state = (pair, name) => at(pair.states[name], count(pair) * (/vector|held/.test(name) ? 3 : 1));
+const bodyNames = data.words ? ["body"] : bodies.length ? ["body", "von_mises", "size", ...data.axes.map((axis) => `move_${axis}`), ...Object.keys(bodies[0].values).filter((name) => name.startsWith("stress_"))] : [];
 
 function values(body, name, every = false) {  // at the nodes of a body, in the state shown or in every state
   if (body.values[name]) return every ? body.values[name] : at(body.values[name], count(body));
@@ -47,11 +48,11 @@ function sign(name, image) {  // by which a component changes in an image; those
 }
 
 function placed(item) {  // places of the nodes of all images shown, one image after the other
-  const length = count(item), dim = data.dim, move = at(item.move, dim * length), all = shownImages(), xyz = [0, 1, 2].map(() => new Float32Array(length * all.length));
+  const length = count(item), dim = data.dim, move = at(item.move, dim * length), more = Math.max(0, now.scale - 1), all = shownImages(), xyz = [0, 1, 2].map(() => new Float32Array(length * all.length));
   all.forEach((image, k) => {
     for (let c = 0; c < 3; c++) {
       const plane = image.find(([axis]) => axis === c), turn = plane ? -1 : 1, shift = plane ? 2 * plane[1] : 0;
-      for (let i = 0; i < length; i++) xyz[c][k * length + i] = shift + turn * (item.points[3 * i + c] + (c < dim ? now.scale * move[dim * i + c] : 0));
+      for (let i = 0; i < length; i++) xyz[c][k * length + i] = shift + turn * (item.points[3 * i + c] + (c < dim ? now.scale * move[dim * i + c] + (item.lift ? more * item.lift[dim * i + c] : 0) : 0));
     }
   });
   return xyz;
@@ -69,28 +70,20 @@ function imaged(numbers, change) {  // those of all images shown, one image afte
 const repeated = (values, name = "") => imaged(values, (image) => [sign(name, image), 0]);
 const numbered = (cells, length) => imaged(cells, (_, k) => [1, k * length]);
 
-function facing(cells, length) {  // triangles of all images: those of a mirror image turn the other way round
-  const made = numbered(cells, length);
-  shownImages().forEach((image, k) => {
-    if (image.length % 2) for (let i = k * cells.length; i < (k + 1) * cells.length; i += 3) [made[i + 1], made[i + 2]] = [made[i + 2], made[i + 1]];
-  });
-  return made;
-}
-
 const TETRAHEDRA = [[0, 1, 3, 4], [1, 2, 3, 6], [1, 3, 4, 6], [3, 4, 6, 7], [1, 4, 5, 6]];  // of a hexahedron
 
 function shaped(item, quantity) {  // what is drawn of an item: places, values, triangles, the node behind each place, and lines
-  const xyz = placed(item), length = count(item), cells = facing(whole(item, "cells"), length);
+  const xyz = placed(item), length = count(item), cells = numbered(whole(item, "cells"), length);
   const made = {xyz, values: repeated(...quantity), cells, from: null, lines: (pairs) => numbered(pairs, length)};
   return now.cut === "" ? made : cut(item, made, length);
 }
 
-function knifeAt() {  // axis of the section, its place, and a function that is positive on what is cut off: the side of the eye at first
+function knifeAt() {  // axis and place of the section; positive on what is cut off: the side of the eye at first
   const axis = Number(now.cut), [low, high] = data.box, place = low[axis] + now.place * (high[axis] - low[axis]), turn = axis < 2 ? -1 : 1;
   return {axis, place, beyond: (x) => turn * (x - place)};
 }
 
-function cut(item, whole, length) {  // what lies on one side of a plane, closed by the section through the elements
+function cut(item, whole, length) {  // one side of a plane, closed by the section
   const {axis, beyond} = knifeAt(), xyz = whole.xyz.map((x) => [...x]), found = [...whole.values], from = [...found.keys()], cells = [], height = (i) => beyond(xyz[axis][i]);
   const split = (made, a, b) => {  // the place on the line from a to b where the plane cuts it, made once
     const key = a < b ? a * from.length + b : b * from.length + a;
@@ -135,14 +128,13 @@ function cut(item, whole, length) {  // what lies on one side of a plane, closed
   return {xyz, values: found, cells, from: [...from, ...origins], lines: drawn};
 }
 
-const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.cividis), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette((data.roles || [0]).map((_, i) => ["999999", "0072B2", "009E73", "CC79A7", "D55E00", "E69F00", "56B4E9", "F0E442"][i % 8]), true)};
-const ROUNDING = 1e-12;  // of the size of the bodies, below which a gap or a slip is what rounding leaves of zero
+const TABLES = {bodies: palette(PALETTES.viridis), contact: palette(PALETTES.heat), status: palette(["666666", "0072B2", "D55E00"], true), body: palette((bodies.length ? bodies : [0]).map((_, i) => ["dcd8d0", "c5d3e0", "d5e0c5", "e3cfc8"][i % 4]), true), role: palette((data.roles || [0]).map((_, i) => ["999999", "0072B2", "009E73", "CC79A7", "D55E00", "E69F00", "56B4E9", "F0E442"][i % 8]), true)};
 const BIN = 16;  // pixels, the side of a square of the picture that shows at most one arrow
 const painter = new Painter(view);
 let owners = [];  // [first number, item, node behind the corners of its triangles or its dots]
 
 function bodyColours() {
-  if (data.words) return {table: TABLES.body, low: -0.5, high: bodies.length - 0.5, names: bodies.map((body) => body.name)};
+  if (now.field === "body") return {table: TABLES.body, low: -0.5, high: bodies.length - 0.5, names: bodies.map((body) => body.name)};
   const shown = bodies.filter((body) => body.shown), [low, high] = shown.length ? span(shown.map((body) => values(body, now.field, true))) : [0, 1], mises = now.field === "von_mises";
   return {table: TABLES.bodies, low: mises ? 0 : low, high: mises ? Math.min(high, data.top) : high};
 }
@@ -151,7 +143,7 @@ function contactColours() {
   if (now.contact === "role") return {table: TABLES.role, low: -0.5, high: data.roles.length - 0.5, names: data.roles};
   if (now.contact === "status") return {table: TABLES.status, low: -0.5, high: 2.5, names: STATUS};
   const [low, high] = span(contacts.filter((pair) => pair.shown).map((pair) => pair.states[now.contact]));
-  return {table: TABLES.contact, low, high};
+  return {table: TABLES.contact, low: now.contact === "gap" ? low : Math.min(low, 0), high};
 }
 
 function own(item, meta, cells) {  // numbers for the triangles of an item, or for its dots
@@ -160,20 +152,43 @@ function own(item, meta, cells) {  // numbers for the triangles of an item, or f
   return first;
 }
 
+function hides(body) {  // whether it may stand between the eye and the contact looked at: all but the body behind that
+  if (flat || !now.clear || now.cut !== "") return false;
+  const {normal, bodies: names} = contacts[now.focus] ?? {}, eye = painter.axes[2];
+  return !normal || body.name !== names[normal.reduce((sum, value, c) => sum + value * eye[c], 0) > 0 ? 1 : 0];
+}
+
 function paintBody(body, colours) {
   const shape = shaped(body, [values(body, now.field), now.field]), drawn = [["lines", 90, 1], ["edges", 20, 1.6]].filter(([name]) => now[name]).map(([name, ...look]) => [shape.lines(name === "edges" ? whole(body, name) : body[name]), ...look]);
   const places = painter.places(shape.xyz), first = own(body, {body: bodies.indexOf(body), from: shape.from, places}, shape.cells);
-  painter.triangles(places, shape.cells, shape.values, {...colours, lit: !flat, sheer: now.clear, first});
+  painter.triangles(places, shape.cells, shape.values, {...colours, lit: !flat, sheer: hides(body), first});
   for (const [pairs, ...look] of drawn) painter.lines(places, pairs, ...look);
 }
 
 function paintContact(pair, colours) {
   const shape = shaped(pair, [state(pair, now.contact)]), places = painter.places(shape.xyz), meta = {contact: contacts.indexOf(pair), from: shape.from, places};
-  if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, lit: false, towards: 1, first: own(pair, meta, shape.cells)});
+  if (pair.lines?.length) {
+    const {places: corners, cells, from} = painter.ribbon(places, shape.lines(pair.lines), 8);
+    painter.lines(places, shape.lines(pair.lines), 20, 10, 5);
+    painter.triangles(corners, cells, from.map((node) => shape.values[node]), {...colours, lit: false, towards: 7, first: own(pair, {...meta, places: corners, from}, cells)});
+  } else if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, lit: false, towards: painter.dense, first: own(pair, meta, shape.cells)});
   else painter.dots(places, shape.values, 3, {...colours, first: own(pair, meta)});
 }
 
-function arrows(pair) {  // of each square of the picture the largest force
+function held(pair) {  // at marked places a triangle along each axis along which they are held, its tip on the place; 2: full
+  const xyz = placed(pair), length = count(pair), ways = state(pair, "held"), marked = state(pair, "status"), [right, up] = painter.axes;
+  shownImages().forEach((image, k) => {
+    for (let i = 0; i < length; i++) for (let c = 0; c < data.dim; c++) {
+      const own = ways[3 * i + c], way = 15 * Math.sign(own) * (image.some(([axis]) => axis === c) ? -1 : 1), [dx, dy] = [way * right[c], -way * up[c]], size = Math.hypot(dx, dy);
+      if (!marked[i] || size < 3) continue;
+      const [x, y] = painter.place(...xyz.map((own) => own[k * length + i])).map((value) => value / painter.dense), [a, b] = [(-dy * 6) / size, (dx * 6) / size];
+      painter.stroke([[x, y], [x + dx + a, y + dy + b], [x + dx - a, y + dy - b], [x, y]], COLOURS.blue, 1.5, Math.abs(own) > 1 ? COLOURS.blue : "#fff");
+      painter.stroke([[x + dx + 1.6 * a, y + dy + 1.6 * b], [x + dx - 1.6 * a, y + dy - 1.6 * b]], COLOURS.blue, 3);
+    }
+  });
+}
+
+function arrows(pair) {  // the largest force of each square
   const xyz = placed(pair), length = count(pair), force = state(pair, "vector"), status = state(pair, "status"), every = pair.states.vector, best = new Map();
   let largest = 1e-300;
   for (let i = 0; i < every.length; i += 3) largest = Math.max(largest, Math.hypot(every[i], every[i + 1], every[i + 2]));
@@ -185,11 +200,11 @@ function arrows(pair) {  // of each square of the picture the largest force
       if (!(best.get(key)?.size >= size)) best.set(key, {size, foot, way: [0, 1, 2].map((c) => (image.some(([axis]) => axis === c) ? -1 : 1) * force[3 * i + c])});
     }
   });
-  const [right, up] = painter.axes, longest = (0.13 * Math.min(view.clientWidth, view.clientHeight)) / largest, along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const [right, up] = painter.axes, longest = ((data.words ? 0.08 : 0.13) * Math.min(view.clientWidth, view.clientHeight)) / largest, along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   for (const {size, foot, way} of best.values()) if (size > 0.01 * largest) painter.arrow(foot, [longest * along(way, right), -longest * along(way, up)]);
 }
 
-function room() {  // left, right, top and bottom of the picture between the colour bars and the labels [pixels of the page]
+function room() {  // left, right, top and bottom of the picture between the colour bars and the labels
   return [flat ? 64 : 20, view.clientWidth - 20, contacts.length ? 62 : 20, view.clientHeight - (bodies.length ? 56 : 8) - (flat ? 34 : 14)];
 }
 
@@ -202,7 +217,7 @@ function aim() {  // turns the model, and makes the box fit
   painter.look(axes, low.map((value, i) => (value + high[i]) / 2 + now.shift[i]), scale, [(left + right) / 2, (top + bottom) / 2]);
 }
 
-function rulers() {  // coordinates of the mesh: along the rim of a plane picture, in space along edges of the box
+function rulers() {  // along the rim of a plane picture, in space along edges of the box
   const [left, right, top, bottom] = room(), name = (c) => `${data.axes[c]} [${LENGTH}]`, pixel = painter.scale / painter.dense, centre = painter.centre;
   if (flat) {
     const middle = [(left + right) / 2, (top + bottom) / 2], ends = [[left, right].map((x) => centre[0] + (x - middle[0]) / pixel), [bottom, top].map((y) => centre[1] - (y - middle[1]) / pixel)];
@@ -226,19 +241,20 @@ function rulers() {  // coordinates of the mesh: along the rim of a plane pictur
   }
 }
 
-function draw() {
+function draw(moving = false) {
   const body = bodyColours(), contact = contactColours(), pairs = contacts.filter((pair) => pair.shown);
   owners = [];
-  painter.begin(); aim();
+  painter.begin(moving); aim();
   for (const item of bodies) if (item.shown) paintBody(item, body);
   for (const pair of pairs) paintContact(pair, contact);
   painter.end(room());
   rulers();
-  if (now.arrows) pairs.forEach(arrows);
+  if (now.arrows) pairs.forEach((pair) => (pair.states.held ? held : arrows)(pair));
   const [name, unit] = CONTACT[now.contact];
-  if (pairs.length) painter.bar((data.words ? name : `contact: ${name}`) + (unit ? ` [${unit}]` : ""), contact, 20);
+  for (const [id, on] of [["mesh", now.lines], ["forces", now.arrows], ["slice", now.cut !== ""]]) control(id).setAttribute("aria-pressed", on);
+  if (pairs.length) painter.bar((data.words || contacts.length > 1 ? name : `${name} between the bodies`) + (unit ? ` [${unit}]` : ""), contact, 20);
   if (bodies.length) {
-    painter.bar(label(now.field) + (data.moving && now.field.startsWith("stress_") ? ", last state" : ""), body, view.clientHeight - 32);
+    painter.bar(label(now.field), body, view.clientHeight - 32);
     if (!data.words) painter.text(now.scale === 1 ? "displacements to scale" : `displacements drawn x ${number(now.scale)}`, view.clientWidth - 8, room()[2] - 8, "right");
   }
   if (now.probe) {
@@ -246,8 +262,6 @@ function draw() {
     painter.stroke(Array.from({length: 33}, (_, i) => [x + 7 * Math.cos((i * Math.PI) / 16), y + 7 * Math.sin((i * Math.PI) / 16)]), "#d00", 2.5);
   }
 }
-
-const rounded = (length) => (Math.abs(length) < ROUNDING * Math.max(...data.box[0].map((low, c) => data.box[1][c] - low)) ? 0 : length);
 
 function probe(place) {
   now.probe = place;
@@ -263,7 +277,7 @@ function probe(place) {
   add(place.body === undefined ? "contact" : "node", `${i} of ${item.name}`, "");
   data.axes.forEach((name, c) => add(name, item.points[3 * i + c], LENGTH));
   if (place.body === undefined) {
-    for (const [name, [words, unit]] of Object.entries(CONTACT)) add(words, name === "status" ? STATUS[state(item, name)[i]] : name === "role" ? data.roles[state(item, name)[i]] : unit === LENGTH ? rounded(state(item, name)[i]) : state(item, name)[i], unit);
+    for (const [name, [words, unit]] of Object.entries(CONTACT)) { const value = state(item, name)[i]; add(words, {status: STATUS, role: data.roles}[name]?.[value] ?? value, unit); }
   } else {
     for (const name of bodyNames) {
       const words = label(name), end = words.lastIndexOf(" [");
@@ -284,10 +298,22 @@ function turn(about, up, closer) {
   draw();
 }
 
-function show(box) {
-  Object.assign(now, {box, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38});
+function show(box, look = {}) {
+  Object.assign(now, {box, zoom: 1, shift: [0, 0, 0], angle: -2.2, height: 0.38, ...look});
+  for (const name of ["field", "clear", "arrows", "lines", "cut"]) { const own = control(name); if (own.type === "checkbox") own.checked = now[name]; else own.value = now[name]; }
+  cutWords();
   draw();
 }
+
+function face(index) {  // the contact of a pair, the eye beside its normal and above
+  const {box, normal} = contacts[index], plain = {field: "body", clear: true, cut: ""};
+  now.focus = index;
+  if (!normal || flat) return show(box ?? data.contact, plain);
+  const [x, y, z] = normal.map((value) => (normal[2] < -0.01 ? -value : value));
+  show(box, {...plain, ...(z > 0.8 ? {height: 0.85} : {angle: Math.atan2(y, x) + 0.55, height: Math.min(1.2, Math.asin(Math.min(1, z)) + 0.35)})});
+}
+
+const reset = () => (data.words ? show(data.box) : face(data.first));
 
 function pick(x, y) {  // the node at a place of the picture [pixels of the page]
   const column = Math.floor(x * painter.dense), row = Math.floor(y * painter.dense), reach = Math.ceil(4 * painter.dense);
@@ -299,7 +325,7 @@ function pick(x, y) {  // the node at a place of the picture [pixels of the page
   }
   if (!best) return null;
   const {first, cells, from, places, body, contact} = owners.findLast((one) => one.first <= best.number), k = best.number - first, away = (i) => Math.hypot(places[0][i] - column, places[1][i] - row);
-  const corner = cells ? [...cells.slice(3 * k, 3 * k + 3)].reduce((a, b) => (away(b) < away(a) ? b : a)) : k, item = body === undefined ? contacts[contact] : bodies[body];
+  const corner = cells ? [0, 1, 2].map((c) => cells[3 * k + c]).reduce((a, b) => (away(b) < away(a) ? b : a)) : k, item = body === undefined ? contacts[contact] : bodies[body];
   return {body, contact, node: (from ? from[corner] : corner) % count(item)};
 }
 
@@ -329,11 +355,13 @@ function listen() {  // to mouse, pen and fingers
   }, {passive: false});
 }
 
-let asked = false;
-function requestDraw() {
+let asked = false, rest = 0;
+function requestDraw() {  // at once as it moves, and in full when it rests
+  clearTimeout(rest);
+  rest = setTimeout(draw, 150);
   if (asked) return;
   asked = true;
-  requestAnimationFrame(() => { asked = false; draw(); });
+  requestAnimationFrame(() => { asked = false; draw(true); });
 }
 
 function sections(pair, c) {  // lines across the triangles of a surface in space, along coordinate c of the surface through the largest pressure
@@ -345,7 +373,8 @@ function sections(pair, c) {  // lines across the triangles of a surface in spac
     const share = (level - y[a]) / (y[b] - y[a]);
     made.x.push(x[a] + share * (x[b] - x[a])); made.y.push(pressure[a] + share * (pressure[b] - pressure[a]));
   }
-  return {...made, pairs: true};
+  const touches = (_, i) => Math.max(made.y[i - (i % 2)], made.y[i - (i % 2) + 1]) > 1e-3 * pressure[peak];  // either end of a line
+  return {x: made.x.filter(touches), y: made.y.filter(touches), pairs: true};
 }
 
 function drawContact() {
@@ -366,10 +395,7 @@ function drawContact() {
   ], `place on the surface [${LENGTH}]`, `traction [${STRESS}]`);
 }
 
-function columnLabel(name) {
-  const unit = {approach: LENGTH, shift: LENGTH, contact_half_width: LENGTH, stick_half_width: LENGTH, normal_force: FORCE, shear_force: FORCE}[name] ?? (/energy$|work$/.test(name) ? `${FORCE} ${LENGTH}` : name === "seconds" ? "s" : "");
-  return name.replaceAll("_", " ") + (unit && !name.includes("[") ? ` [${unit}]` : "");
-}
+const columnLabel = (name) => data.columns[name] ?? name;
 
 function drawPath() {
   if (!data.history) return;
@@ -419,12 +445,12 @@ const knife = control("cut-place"), cutWords = () => {
 };
 choices("cut", [["", "nothing"], ...data.axes.map((name, axis) => [axis, name])], "", (value) => { now.cut = value; cutWords(); });
 knife.value = now.place;
-knife.addEventListener("input", () => { now.place = Number(knife.value); cutWords(); draw(); });
+knife.addEventListener("input", () => { now.place = Number(knife.value); cutWords(); requestDraw(); });
 cutWords();
 const slider = control("scale");
 slider.max = data.most_scale; slider.step = data.most_scale / 100; slider.value = data.scale;
 const times = () => { control("scale-words").textContent = `displacements x ${number(now.scale)}`; };
-slider.addEventListener("input", () => { now.scale = Number(slider.value); times(); draw(); });
+slider.addEventListener("input", () => { now.scale = Number(slider.value); times(); requestDraw(); });
 times();
 if (data.history) {
   const columns = Object.keys(data.history), h = data.history, moves = (name) => h[name] && Math.max(...h[name]) - Math.min(...h[name]) > 1e-6 * (Math.max(...(h.approach || [1])) - Math.min(...(h.approach || [0])));
@@ -432,35 +458,39 @@ if (data.history) {
   for (const [id, chosen] of [["across", across], ["upward", upward]]) choices(id, [...(id === "across" ? [["state", "state"]] : []), ...columns.map((name) => [name, columnLabel(name)])], chosen, () => {});
   const steps = control("state");
   steps.max = data.states - 1; steps.value = now.state;
-  steps.addEventListener("input", () => { now.state = Number(steps.value); stateWords(); everything(); if (now.probe) probe(now.probe); });
-} else control("path").hidden = true;
+  steps.addEventListener("input", () => { now.state = Number(steps.value); stateWords(); requestDraw(); if (charted) { drawContact(); drawPath(); } if (now.probe) probe(now.probe); });
+} else control("path").hidden = control("states").hidden = true;
 if (!bodies.length) control("body-controls").hidden = true;
-for (const [id, ...move] of [["left", -1, 0, 1], ["right", 1, 0, 1], ["up", 0, 1, 1], ["down", 0, -1, 1], ["closer", 0, 0, 0.8], ["farther", 0, 0, 1.25]])
-  control(id).addEventListener("click", () => turn(...move));
-control("home").addEventListener("click", () => show(data.box));
-control("near").addEventListener("click", () => show(data.contact));
+const flip = (name) => { control(name).checked = now[name] = !now[name]; draw(); }, places = contacts.flatMap((pair, i) => (pair.box ? [i] : []));
+const PRESSED = {
+  near: ["c", () => (data.words ? show(data.contact) : face(now.focus))], next: ["n", () => face(places[(places.indexOf(now.focus) + 1) % places.length])],
+  home: ["b", () => show(data.box, data.words ? {} : {field: "von_mises", clear: false})], mesh: ["w", () => flip("lines")], forces: ["f", () => flip("arrows")],
+  slice: ["x", () => { const ways = ["", ...data.axes.keys()].map(String), own = control("cut"); own.value = ways[(ways.indexOf(String(now.cut)) + 1) % ways.length]; own.dispatchEvent(new Event("change")); }], reset: ["r", reset],
+};
+for (const [id, [key, act]] of Object.entries(PRESSED)) {
+  control(id).addEventListener("click", act);
+  document.addEventListener("keydown", (event) => { if (event.key === key && !event.ctrlKey && !event.metaKey && !/INPUT|SELECT/.test(event.target.tagName)) act(); });
+}
+control("next").hidden = flat || places.length < 2;
+control("slice").hidden = flat || !bodies.length;
 const KEYS = {ArrowLeft: [-1, 0, 1], ArrowRight: [1, 0, 1], ArrowUp: [0, 1, 1], ArrowDown: [0, -1, 1], "+": [0, 0, 0.8], "=": [0, 0, 0.8], "-": [0, 0, 1.25]};
 view.addEventListener("keydown", (event) => { if (KEYS[event.key]) { turn(...KEYS[event.key]); event.preventDefault(); } });
-control("largest").addEventListener("click", () => {
-  let best = null;
-  bodies.forEach((body, index) => { if (body.shown) values(body, now.field).forEach((value, node) => { if (!best || value > best.value) best = {value, body: index, node}; }); });
-  if (best) probe({body: best.body, node: best.node});
-  draw();
+const seek = (id, list, of, kind) => control(id).addEventListener("click", () => {  // the largest of some values at all nodes
+  let best = -Infinity;
+  list.forEach((item, index) => item.shown && of(item).forEach((value, node) => { if (value > best) { best = value; now.probe = {[kind]: index, node}; } }));
+  probe(now.probe); draw();
 });
-control("peak").addEventListener("click", () => {
-  let best = null;
-  contacts.forEach((pair, index) => state(pair, "pressure").forEach((value, node) => { if (!best || value > best.value) best = {value, contact: index, node}; }));
-  if (best) probe({contact: best.contact, node: best.node});
-  draw();
-});
+seek("largest", bodies, (body) => values(body, now.field === "body" ? "von_mises" : now.field), "body");
+seek("peak", contacts, (pair) => state(pair, "pressure"), "contact");
 listen();
+control("pair-control").hidden = contacts.length < 2;
 stateWords();
-show(now.box);
+reset();
 performance.mark("drawn");
 new ResizeObserver(() => { if (!painter.fits()) requestDraw(); }).observe(view);  // it also calls at once
 for (const id of ["charts", "scale-control", "most"]) control(id).hidden = Boolean(data.words);
 if (data.words) return;
-await new Promise((then) => requestAnimationFrame(() => setTimeout(then)));  // the picture is on the screen before the charts are made
+await new Promise((then) => requestAnimationFrame(() => setTimeout(then)));  // first the picture
 charted = true;
 drawContact();
 drawPath();

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
+from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem
 
 try:
@@ -38,7 +38,7 @@ class Sweeps:
 
     def __init__(self, problem: InterfaceProblem, memory: int = 0):
         Q, (k, dim) = problem.Q, problem.q.shape
-        rows = (Q.indptr, Q.indices, Q.data) if sp.issparse(Q) else (NONE, NONE, np.asarray(Q))
+        rows = (Q.indptr, Q.indices, Q.data) if form(Q) == "sparse" else (NONE, NONE, np.asarray(Q))
         both = (problem.law.lowest != 0).astype(np.uint8)
         places = [np.ascontiguousarray(place, dtype=np.int64) for place in rows[:2]]
         reals = [np.ascontiguousarray(array, float) for array in (rows[2], problem.mu)]

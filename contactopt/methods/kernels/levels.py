@@ -10,9 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
-from contactopt.linear.convolution import Convolution, Kernel, backward, forward
+from contactopt.linear.convolution import Kernel, backward, forward
 from contactopt.linear.counter import Counter
 from contactopt.linear.deadline import check_time
+from contactopt.linear.operators import form
 from contactopt.methods.constants import COARSEST, LEAST_DETERMINANT, LEAST_SYMBOL
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
@@ -42,7 +43,7 @@ class Level:
     @classmethod
     def of_problem(cls, problem: InterfaceProblem) -> Level:
         """The finest level; problem.Q is a Convolution."""
-        assert isinstance(problem.Q, Convolution)
+        assert form(problem.Q) == "convolution"
         kernel, law = problem.Q.kernel, problem.law
         smooth = law.proportional and not law.rough.any()
         components = (0,) if smooth else tuple(range(problem.dim))

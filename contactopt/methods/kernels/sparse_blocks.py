@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse.linalg import splu
 
-from contactopt.linear.operators import Interface
+from contactopt.linear.operators import Interface, form
 from contactopt.methods.constants import FULL, SMALL
 
 # A diagonal entry this much smaller than the largest of its column is still a pivot: other pivots
@@ -196,7 +196,7 @@ class SparseBlocks(Blocks):
 
 def block_matrix(Q: Interface, d: int) -> Blocks:
     """Q in blocks of d components for block systems, sparse where that beats LAPACK on an array."""
-    if not sp.issparse(Q):
+    if form(Q) != "sparse":
         return DenseBlocks(Q, d)
     n = Q.shape[0]
     return DenseBlocks(Q.toarray(), d) if n <= SMALL or Q.nnz > FULL * n * n else SparseBlocks(Q, d)

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from contactopt.linear.deadline import check_time
-from contactopt.linear.operators import InterfaceOperator
+from contactopt.linear.operators import has_entries
 from contactopt.problem import Infeasible, InterfaceProblem
 
 ZERO = 1e-9  # of a dimensionless problem: what is smaller counts as zero
@@ -316,7 +316,7 @@ def can(problem: InterfaceProblem) -> bool:
     """Whether the tree takes a problem."""
     law = problem.law
     coulomb = law.unilateral and law.proportional and not law.dilatant
-    return coulomb and not isinstance(problem.Q, InterfaceOperator)
+    return coulomb and has_entries(problem.Q)
 
 
 def sides_of(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> np.ndarray:

@@ -52,8 +52,10 @@ class Coulomb(Law):
         return P, D
 
     def mapped(self, y: np.ndarray) -> np.ndarray:
-        height = np.maximum(y[:, 0], 0.0)
-        return np.column_stack([height, disc(y[:, 1:], self.mu * height)])
+        P = np.empty_like(y)
+        np.maximum(y[:, 0], 0.0, out=P[:, 0])
+        P[:, 1:] = disc(y[:, 1:], self.mu * P[:, 0])
+        return P
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
         n, t = split(y)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -75,7 +75,7 @@ class Law:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters."""
-        return tuple(f.name for f in fields(self))  # type: ignore[arg-type]
+        return _names_of(type(self))  # type: ignore[arg-type]
 
     @property
     def contacts(self) -> int:
@@ -313,10 +313,12 @@ class Law:
         """The law of k contacts, whose numbers become arrays (k,). InputError if one is an array of
         another length.
         """
-        for name in self.parameters:
-            shape = np.shape(getattr(self, name))
+        shapes = {name: np.shape(getattr(self, name)) for name in self.parameters}
+        for name, shape in shapes.items():
             if shape not in ((), (k,)):
                 raise InputError(f"{name} must have shape {(k,)}; got {shape}.")
+        if all(shapes.values()):
+            return self
         return self._mapped(lambda parameter: np.broadcast_to(parameter, (k,)))
 
     @classmethod
@@ -347,3 +349,8 @@ class Law:
 
     def _mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> Self:
         return replace(self, **{name: change(getattr(self, name)) for name in self.parameters})  # type: ignore[type-var]
+
+
+@cache
+def _names_of(law: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(law))

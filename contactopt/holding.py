@@ -1,0 +1,357 @@
+"""The factor on a load at which friction no longer holds the bodies, and they slide away.
+
+With f times a load, u = Q r + V lambda + q + f g and V' r + s + f l = 0 (contactopt.problem): the
+load adds g to the displacements at r = 0 [length] and l to the resultants [force].
+
+1. Statics. The factors f with forces r in the friction cones K and V' r + s + f l = 0 form an
+   interval, perhaps without 0, whose ends contactopt.models.static_limit finds. No f outside lets
+   the bodies rest, whatever their elasticity. By the static theorem the ends are the limits where
+   friction is associated. Coulomb's may be less, and where elasticity makes the normal forces, as
+   in a fit or under a clamp, nothing bounds them here: the interval has no end.
+2. Push. The load is replaced by a prescribed motion of the place where it acts, and f is its
+   reaction. The displacement along the load is w = l' lambda + g' r + c f, with c = F' C F of the
+   forces F of the load. Turn the motions so that l = |l| e_1. Then V_1' r + s_1 + |l| f = 0 gives
+   f, and w = d gives lambda_1. What remains has no row and no column of either,
+
+       Q* = Q - (v g' + g v') + c v v',   q* = q + v (d + c s_1 / |l|) / |l| - g s_1 / |l|,
+       v = V_1 / |l|   (g s_1 / |l| and c s_1 / |l| from the loads that stay),
+
+   and Q* is semidefinite because [Q g; g' c] is. After the states of the load path, d grows from
+   0 by the factor GROWTH from push to push, slip measured from the push before, until f no longer
+   does, by far less than with the steepest push.
+   It grows for ever where all forces grow with d: the cones and the laws are homogeneous, so that
+   nothing but what stays, however small beside it, could end that.
+
+The push gives Coulomb's limit, and the ends of statics are confirmed or corrected by it. The error
+is the difference between two meshes, of which the finer one has elements of half the size.
+
+Source: Drucker (1954), Coulomb friction, plasticity, and limit loads, J. Appl. Mech. 21, 71-74.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.linalg as la
+
+from contactopt.accuracy.marking import divisible, finer, with_bent_edges
+from contactopt.cards import force_unit
+from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt.errors import InputError, Unbalanced
+from contactopt.linear.operators import dense
+from contactopt.methods.driver import solve
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.scaling import scales_of
+from contactopt.runner import states_of
+from contactopt.scenes.scene import BodyForce, Part, Plate, Scene
+from contactopt.solving.follow import follow_path
+from contactopt.solving.solve_scene import Options
+
+GROWTH = 4.0  # of the prescribed motion from push to push
+EARLY = 6  # pushes that need not be solved while the motion is small
+PUSHES = 20  # so that the last one is 1e12 times the first
+STEADY = 1e-5  # relative growth of the force below which it no longer grows
+ALIKE = 1e-3  # relative difference by which forces are a multiple of others, or two limits the same
+NOTHING = 1e-9  # of the forces of the contacts: a load that is rounding
+WAYS = {
+    "statics": "the largest one that forces in the friction cones balance, confirmed by a push",
+    "bound": "a bound: no larger one is balanced by forces in the friction cones",
+    "push": "found by pushing the place of the load until its force no longer grew",
+    "supports": "supports bear this load, whatever friction does",
+}
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """At which factor on a load the bodies slide away.
+
+    factor    0: at any such load; infinite: at none; not a number: no push could be solved
+    interval  of the factors at which forces in the friction cones balance the loads, with `factor`
+              for its upper end; None: the bodies rest at no factor
+    error     of the factor, estimated from two meshes
+    way       'statics', 'bound', 'push' or 'supports', which the sentence explains
+    sentence  the answer in words
+    factors   on the coarser and on the finer mesh
+    """
+
+    factor: float
+    interval: tuple[float, float] | None
+    error: float
+    way: str
+    sentence: str
+    factors: tuple[float, float]
+
+    def __str__(self) -> str:
+        return self.sentence
+
+
+def limit(
+    scene: str | Path | Scene,
+    load: str | None = None,
+    *,
+    note: Note = lambda text: None,
+    **changes: Any,
+) -> Limit:
+    """Find the factor on a load at which friction no longer holds the bodies.
+
+    Parameters
+    ----------
+    scene : as for contactopt.run
+    load : which load grows, as BODY:BOUNDARY:COMPONENT, or all those that begin with BODY or
+        BODY:BOUNDARY; BODY:body_force and, of a body without a mesh, BODY:force. None: what the
+        last step of the load path changes
+    note : receives progress messages
+    changes : as for contactopt.run
+
+    Returns
+    -------
+    Limit : the factor on the load in the last state, or on what the last step changes
+
+    Raises
+    ------
+    InputError : for a load that is not there, which names those that are
+    """
+    return limit_of(states_of(scene, **changes)[0], load, note)
+
+
+def limit_of(
+    states: tuple[Scene, ...], load: str | None = None, note: Note = lambda text: None
+) -> Limit:
+    """As limit(), of the states of a load path."""
+    held = _held(states, load)
+    found = []
+    for mesh, (before, last) in enumerate(_meshes(held, states[-1]), 1):
+        note(f"mesh {mesh} of 2: {last.name}")
+        found.append(_on_mesh(before, last, note))
+    (coarse, _, _), (factor, interval, way) = found
+    error = 0.0 if coarse == factor else abs(factor - coarse)
+    words = _words(states[-1], load or "the last step", _force(held[-1], states[-1]), found, error)
+    return Limit(factor, interval, error, way, words, (coarse, factor))
+
+
+def _rows(scene: Scene) -> dict[str, tuple[float, bool]]:
+    """The loads of a scene by their names BODY:BOUNDARY:COMPONENT: the value, and whether it is a
+    total force.
+    """
+    found: dict[str, tuple[float, bool]] = {}
+    for part in scene.parts:
+        for load in getattr(part, "loads", ()):
+            total = isinstance(load, Plate)
+            own = load.force if total else dict(zip(scene.components, load.value))
+            found |= {f"{part.name}:{_place(load)}:{c}": (own[c], total) for c in own}
+        whole = getattr(part, "force", None) or {}
+        found |= {f"{part.name}:force:{c}": (whole[c], True) for c in whole}
+    return found
+
+
+def _place(load: Any) -> str:
+    return "body_force" if isinstance(load, BodyForce) else load.boundary
+
+
+def _belongs(name: str, load: str) -> bool:
+    return f"{name}:".startswith(f"{load}:")
+
+
+def _held(states: tuple[Scene, ...], load: str | None) -> tuple[Scene, ...]:
+    """The states that are followed before the load grows, which has no share in them."""
+    last = states[-1]
+    rows = [name for name, (value, _) in _rows(last).items() if value]
+    listed = f"its loads are {', '.join(rows) or 'none'}"
+    if load is None:
+        before = [i for i, own in enumerate(states) if own.state != last.state]
+        if len(states) < 2:
+            raise InputError(f"scene '{last.name}': name the load that grows; {listed}.")
+        return states[: (before[-1] if before else 0) + 1]
+    if not any(_belongs(name, load) for name in rows):
+        raise InputError(f"scene '{last.name}' has no load '{load}'; {listed}.")
+    return tuple(_without(scene, load) for scene in states)
+
+
+def _without(scene: Scene, load: str) -> Scene:
+    """The scene with zero in place of a load."""
+
+    def left(name: str, own: Mapping[str, float]) -> dict[str, float]:
+        return {c: 0.0 if _belongs(f"{name}:{c}", load) else own[c] for c in own}
+
+    def eased(name: str, own: Any) -> Any:
+        if isinstance(own, Plate):
+            return replace(own, force=left(name, own.force))
+        return replace(
+            own, value=tuple(left(name, dict(zip(scene.components, own.value))).values())
+        )
+
+    def changed(part: Any) -> Any:
+        if isinstance(part, Part):
+            loads = (eased(f"{part.name}:{_place(own)}", own) for own in part.loads)
+            return replace(part, loads=tuple(loads))
+        return replace(part, force=part.force and left(f"{part.name}:force", part.force))
+
+    return scene.with_parts(changed)
+
+
+def _force(held: Scene, last: Scene) -> float | None:
+    """The force that the factor 1 stands for, where one total force is all of the load."""
+    before = _rows(held)
+    found = [(v - before.get(name, (0.0,))[0], total) for name, (v, total) in _rows(last).items()]
+    changed = [(value, total) for value, total in found if value]
+    return changed[0][0] if len(changed) == 1 and changed[0][1] else None
+
+
+def _meshes(held: tuple[Scene, ...], last: Scene) -> Iterator[tuple[tuple[Scene, ...], Scene]]:
+    """The states and the loaded scene on a mesh and on one with elements of half the size."""
+    states = (*held, last)
+    if not last.given:
+        for elements in (max(1, last.elements // 2), 2 * max(1, last.elements // 2)):
+            *before, loaded = (replace(scene, elements=elements) for scene in states)
+            yield tuple(before), loaded
+        return
+    made = [divisible(scene, False) for scene in states]
+    shapes, scenes = made[-1][1], [scene for scene, _ in made]
+    for _ in range(2):
+        *before, loaded = (with_bent_edges(scene, shapes) for scene in scenes)
+        yield tuple(before), loaded
+        scenes = [finer(scene, None, shapes) for scene in scenes]
+
+
+Found = tuple[float, tuple[float, float] | None, str]  # factor, interval, way
+
+
+def _on_mesh(held: tuple[Scene, ...], last: Scene, note: Note) -> Found:
+    """The limit on one mesh."""
+    options = Options(Q="explicit", note=note)
+    slipped: np.ndarray | float = 0.0
+    try:
+        path = follow_path(held, None, None, options)
+        reduction = path.reduction
+        if path.solved:
+            slipped = path.states[-1].displacements[:, 1:]
+    except Unbalanced:  # without the load nothing rests
+        reduction = reduce_bodies(held[-1], Q="explicit")
+    base = reduction.loaded(held[-1])
+    push = _Push.of(base, base.loaded(last))
+    if push is None:
+        return np.inf, (-np.inf, np.inf), "supports"
+    low, high = (push.end(largest) for largest in (False, True))
+    if np.isnan(high):
+        return 0.0, None, "statics"
+    note(f"statics: {low:.6g} to {high:.6g}")
+    found = push.force(slipped, note)
+    if np.isnan(found) and np.isfinite(high):
+        return high, (low, high), "bound"
+    if found == high or abs(found - high) <= ALIKE * min(abs(high), abs(found)) + push.nothing:
+        return high, (low, high), "statics"
+    return found, (low, found), "push"
+
+
+@dataclass(frozen=True, eq=False)
+class _Push:
+    """The problem at f = 0, and g (k dim,), l (p,) and c of the head of this module."""
+
+    problem: InterfaceProblem
+    g: np.ndarray
+    load: np.ndarray
+    c: float
+
+    @classmethod
+    def of(cls, base: Reduction, loaded: Reduction) -> _Push | None:
+        """From the reduced scene without and with the load; None if it moves nothing freely."""
+        load = loaded.problem.s - base.problem.s
+        size = np.abs([loaded.problem.s, base.problem.s]).max(initial=0.0)
+        if not np.abs(load).max(initial=0.0) > NOTHING * size:
+            return None
+        bodies = zip(base.bodies, loaded.bodies)
+        work = [2 * old.energy(new.at_rest - old.at_rest) for old, new in bodies]
+        return cls(base.problem, (loaded.problem.q - base.problem.q).ravel(), load, sum(work))
+
+    @property
+    def nothing(self) -> float:
+        """The factor on the load that is rounding beside the loads that stay."""
+        return float(NOTHING * (1 + np.abs(self.problem.s).sum() / np.linalg.norm(self.load)))
+
+    def end(self, largest: bool) -> float:
+        """An end of the interval of statics, infinite if it has none; not a number if it is
+        empty.
+        """
+        import cvxpy as cp
+
+        from contactopt.models.static_limit import static_limit
+
+        made = static_limit(self.problem, self.load, largest)
+        made.problem.solve(solver=cp.CLARABEL)
+        if made.problem.status in ("infeasible", "infeasible_inaccurate"):
+            return np.nan
+        if made.problem.status in ("unbounded", "unbounded_inaccurate"):
+            return np.inf if largest else -np.inf
+        found = float(made.variables["f"].value)
+        return 0.0 if abs(found) <= 1e2 * self.nothing else found
+
+    def force(self, slipped: np.ndarray | float, note: Note) -> float:
+        """The largest f: infinite if it grows for ever, not a number if a push is not solved."""
+        old, size = self.problem, float(np.linalg.norm(self.load))
+        turn = la.qr(self.load[:, None])[0]
+        turn[:, 0] = self.load / size
+        V, s = old.V @ turn, turn.T @ old.s
+        v, g, rest = V[:, 0] / size, self.g, s[0] / size
+        Q = dense(old.Q) - np.outer(v, g) - np.outer(g, v) + self.c * np.outer(v, v)
+        q = old.q + (v * self.c * rest - g * rest).reshape(old.q.shape)
+        pushed = old.altered(V=V[:, 1:], s=s[1:], Q=Q, q=q, motions=())
+        loaded = old.altered(s=np.abs(old.s) + np.abs(self.load))
+        first = size * max(scales_of(own).length for own in (old, loaded))
+        d, f, r, start, steepest = 0.0, np.nan, np.zeros(q.shape), None, 0.0
+        for push in range(PUSHES):
+            q_d = q + d * v.reshape(q.shape)
+            step = q_d.copy()
+            step[:, 1:] -= slipped
+            now = solve(pushed.altered(q=step), start=start)
+            if not now.solved:
+                note(f"push {push + 1}: {now.message}")
+                if start is None and push < EARLY:  # where nothing rests without the load
+                    d = GROWTH * d or first
+                    continue
+                return np.nan
+            before, f, last, r = f, -float(v @ now.reactions.ravel()) - rest, r, now.reactions
+            note(f"push {push + 1}: {f:.6g} times the load")
+            slope = abs(f - before) / ((1 - 1 / GROWTH * (push > 1)) * d or np.inf)
+            steepest = np.fmax(steepest, slope)
+            small = STEADY * abs(f) + self.nothing
+            if abs(f - before) <= small and (slope <= ALIKE * steepest or abs(f) <= small):
+                return max(f, before)
+            if push > 1 and np.linalg.norm(r - GROWTH * last) <= ALIKE * np.linalg.norm(r):
+                break
+            u = pushed.altered(q=q_d).displacements(r, now.multipliers)
+            slipped, start, d = u[:, 1:], now, GROWTH * d or first
+        return np.inf
+
+
+def _words(scene: Scene, load: str, force: float | None, found: list[Found], error: float) -> str:
+    """The answer in a sentence or two."""
+    factor, interval, way = found[-1]
+    if interval is None:
+        return f"{scene.name}: the bodies slide away, whatever the factor on {load} is."
+    if np.isnan(factor):
+        return (
+            f"{scene.name}: the limit of {load} is unknown, because a push was not solved; -v says"
+            " which."
+        )
+    if factor == np.inf:
+        why = WAYS["supports"] if way == "supports" else "its friction grows with the load"
+        return f"{scene.name}: no factor on {load} makes the bodies slide away: {why}."
+    if factor == 0:
+        return f"{scene.name}: any {load} makes the bodies slide away: the factor is 0."
+    if factor < 0:
+        return (
+            f"{scene.name}: the bodies slide away unless {load} acts the other way, at factors from"
+            f" {interval[0]:.5g} to {factor:.5g}. The last is {WAYS[way]}; two meshes differ by"
+            f" {error:.1e}."
+        )
+    total = "" if force is None else f" ({factor * force:.5g} {force_unit(scene.units)})"
+    below = f"; they also slide away below {interval[0]:.5g}" if interval[0] > 0 else ""
+    return (
+        f"{scene.name}: the bodies slide away at {factor:.5g} times {load}{total}{below}. This is"
+        f" {WAYS[way]}; two meshes differ by {error:.1e}."
+    )
