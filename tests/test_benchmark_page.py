@@ -60,6 +60,7 @@ def test_a_strangers_rows_join_with_their_own_card(campaign, tmp_path):
         rows["machine"] = "a machine of others"
     theirs = pd.concat([theirs.assign(**2 * theirs[times]), new])
     save(theirs, tmp_path / "theirs.csv")
+    shutil.copy(campaign / "answers.npz", tmp_path)
     command = ["report", str(tmp_path / "own"), "--merge", str(tmp_path / "theirs.csv")]
     assert main(command) == 0
     data = data_of(tmp_path / "own" / "report.html")

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from skfem import MeshQuad
+from skfem import MeshHex, MeshQuad
 
 from contactopt import (
     BodyForce,
@@ -25,6 +25,7 @@ from contactopt import (
     limit,
     run,
 )  # fmt: skip
+from contactopt.holding import limit_of
 
 STIFF = Material(E=200.0, nu=0.3)
 
@@ -179,6 +180,21 @@ def test_the_limit_is_that_of_statics_or_of_janssen(name):
         assert found.factor == pytest.approx(exact, rel=1e-5, abs=1e-6), found
 
 
+@pytest.mark.parametrize("angle", [0.0, 35.0])
+def test_in_space_friction_is_a_cone(angle):
+    """mu W = 0.6 in every direction, of a block of weight 2 and of 4 x 4 x 2 elements."""
+    ticks = (np.linspace(0, 2, 5), np.linspace(0, 2, 5), np.linspace(0, 0.5, 3))
+    mesh = MeshHex.init_tensor(*ticks).with_boundaries({"bottom": lambda x: x[2] == 0})
+    turn = math.radians(angle)
+    push = BodyForce((0.5 * math.cos(turn), 0.5 * math.sin(turn), 0.0))
+    loads = (BodyForce((0.0, 0.0, -1.0)), push)
+    block = Part("block", mesh, STIFF, (), loads, "bottom")
+    scene = Scene("block", block, Rigid("floor"), 0.3, kind="solid")
+    lone = replace(scene, upper=replace(block, loads=loads[:1]))
+    found = limit_of((replace(lone, state="weight"), replace(scene, state="push")))
+    assert found.factor == pytest.approx(0.6, rel=1e-4) and found.way == "statics", found
+
+
 def test_a_run_solves_below_the_limit_and_points_at_it_above():
     """Equilibrium alone decides here: a run shares neither the push nor the cone program."""
     found = limit(shaft(), "shaft:top")
@@ -193,9 +209,8 @@ def test_a_run_solves_below_the_limit_and_points_at_it_above():
 
 def test_the_last_step_of_a_path_is_the_load():
     states = [replace(clamped(force), state=name) for force, name in ((0, "press"), (2, "pull"))]
-    import contactopt.holding as holding
 
-    found = holding.limit_of(tuple(states))
+    found = limit_of(tuple(states))
     assert found.factor == pytest.approx(1.5, rel=1e-5) and "(3 " in found.sentence
     assert found.interval == pytest.approx((-1.5, 1.5), rel=1e-5)
 

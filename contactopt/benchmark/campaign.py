@@ -11,17 +11,25 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
-from contactopt.benchmark.measure import Task, absent_row
+from contactopt.benchmark.measure import Task, absent_row, calibration
 from contactopt.benchmark.pool import History, run_locally
 from contactopt.benchmark.report_page import report_campaign
 from contactopt.benchmark.reports import build, layouts, publish
-from contactopt.benchmark.store import Store, lines, load, require, save
+from contactopt.benchmark.store import (
+    ANSWERS,
+    Store,
+    lines,
+    load,
+    require,
+    save,
+    save_answers,
+)
 from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.writing import remove_files, whole_file
 from contactopt.screen import Lines, progress
 
-WRITTEN = ("rows.jsonl", "rows.parquet", "experiment.toml")  # by a campaign
+WRITTEN = ("rows.jsonl", "rows.parquet", "experiment.toml", ANSWERS)  # by a campaign
 
 
 def run_campaign(
@@ -63,6 +71,7 @@ def run_campaign(
         raise InputError("no run matches the filters.")
     for sentence in () if quiet else dict.fromkeys(e.skipped):  # once for each reason
         print(f"left out: {sentence}", file=sys.stderr)
+    calibration()  # before others compute here
     limits = (e.time_limit, e.memory_limit, e.max_iterations, e.seed, e.diagnose)
     with Store(folder, resume) as store:
         if e.path.is_file():
@@ -79,6 +88,7 @@ def run_campaign(
             _keep(rows, store, shown)
         store.keep_own()
         save(load(store.path, absent=True), folder / "rows.parquet")
+        save_answers(folder)
     return folder
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
@@ -79,7 +80,7 @@ def _empty() -> dict[str, Any]:
     """A row made here and now, with every column."""
     unknown = {name: UNKNOWN[kind] for name, (kind, _) in COLUMNS.items() if name != "error"}
     made = {"schema": SCHEMA, "versions": _versions(), "machine": _machine(), "time": _now()}
-    return unknown | made
+    return unknown | made | {"calibration": calibration()}
 
 
 def _now() -> str:
@@ -99,7 +100,24 @@ def _machine() -> str:
         with open("/proc/cpuinfo") as file:
             names = [line.split(":")[1].strip() for line in file if line.startswith("model name")]
         model = names[0] if names else model
-    return f"{model}, {os.cpu_count()} cores, {platform.system()}"
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
+    return f"{model}, {os.cpu_count()} cores, {memory:.0f} GB, {platform.system()}"
+
+
+@cache
+def calibration() -> float:
+    """CPU time [s] of a fixed calculation, the least of five: products and factorisations of
+    matrices, and steps of Python, about half of the time each.
+    """
+    A = np.random.default_rng(0).random((100, 100)) + 100 * np.eye(100)
+    seconds = []
+    for _ in range(5):
+        begin = time.process_time()
+        for _ in range(20):
+            np.linalg.solve(A, A @ A)
+        sum(n * n for n in range(100_000))
+        seconds.append(time.process_time() - begin)
+    return min(seconds)
 
 
 def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
@@ -124,7 +142,7 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
     out["residual"] = residual
     if not np.all(np.isfinite(r)) or (lam is not None and not np.all(np.isfinite(lam))):
         return out | {"status": "not_finite"}
-    out["answer"] = pack(r)
+    out["answer"] = pack(r, lam)
     if residual > task.run.tolerance:
         return out | {"status": "false_claim" if claimed else answer.status}
     if answer.seconds > task.time_limit:

@@ -24,6 +24,9 @@ PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
 # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
 MARGIN, GRACE = 1.1, 0.5
 PEER_GRACE = 30.0  # s for a peer, which ends itself, to start and to take over the problem
+# share of its limit of memory above which a process killed at its limit of time had leaked; Python
+# holds less than its limit when the next request fails
+LEAK = 0.8
 LONG = 1.0  # s of a run above which it is not repeated
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
@@ -79,7 +82,9 @@ class Worker:
             answer = self._answer(task)
         except Ended as end:
             spent = time.perf_counter() - begin
-            return row | {"status": end.status, "message": str(end), "call_seconds": spent}
+            leaked = end.held > LEAK * task.memory_limit
+            status = "out_of_memory" if leaked else end.status
+            return row | {"status": status, "message": str(end), "call_seconds": spent}
         if alone:
             self.solver.kill()
             self.solver.start()

@@ -40,11 +40,13 @@ serve({}, {})
 
 
 class Ended(Exception):
-    """The process ended by itself or was killed at a limit: `phase`, `status`, `message`."""
+    """The process ended by itself or was killed at a limit: `phase`, `status`, `message`, and the
+    memory [GB] that it held when it was killed.
+    """
 
-    def __init__(self, phase: str, status: str, message: str):
+    def __init__(self, phase: str, status: str, message: str, held: float = 0.0):
         super().__init__(message)
-        self.phase, self.status, self.message = phase, status, message
+        self.phase, self.status, self.message, self.held = phase, status, message, held
 
 
 class Process:
@@ -120,12 +122,26 @@ class Process:
             if os.fstat(self.noise.fileno()).st_size > MOST_WORDS:
                 self.noise.truncate(0)
             if time.monotonic() >= deadline:
+                held = self._memory()
                 self.kill()
-                raise Ended(phase, "killed", f"still running after {limit:g} s")
+                words = f"still running after {limit:g} s, holding {held:.2g} GB of memory"
+                raise Ended(phase, "killed", words, held)
         try:
             return self.pipe.recv()
         except (EOFError, OSError):
             raise Ended(phase, *self._death()) from None
+
+    def _memory(self) -> float:
+        """Resident memory of the process and of all that it started [GB]."""
+        import psutil
+
+        size = 0
+        with suppress(psutil.Error):
+            me = psutil.Process(self.process.pid if self.process else None)
+            for one in (me, *me.children(recursive=True)):
+                with suppress(psutil.Error):
+                    size += one.memory_info().rss
+        return size / 1e9
 
     def _death(self) -> tuple[str, str]:
         """How the process ended by itself: (status, message)."""

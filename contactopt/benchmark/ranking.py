@@ -38,12 +38,75 @@ JOINED = {
 }
 
 
+def factors(table: pd.DataFrame) -> dict[str, tuple[float, str]]:
+    """For each machine but the one of most rows, what its times are divided by, and how that was
+    measured; nan where nobody knows.
+
+    Runs that were made on both give the factor, a geometric mean. Without such runs it is the ratio
+    of the calibrations, if the same methods ran on both.
+    """
+    if "machine" not in table or table["machine"].nunique() < 2:
+        return {}
+    first = str(table["machine"].value_counts(sort=True).index[0])
+    of = {str(name): rows for name, rows in table.groupby("machine") if name}
+    runs = {name: _times_of_runs(rows) for name, rows in of.items()}
+    made = {}
+    for name in (name for name in of if name != first):
+        logs = np.log(runs[name] / runs[first]).dropna()
+        speeds = [_calibration(of[one]) for one in (name, first)]
+        if len(logs):
+            by = np.exp(logs.groupby("name").mean())
+            words = f"{len(logs)} runs made on both ({by.min():.2f} to {by.max():.2f} by method)"
+            made[name] = float(np.exp(logs.mean())), words
+        elif set(of[name]["method"]) == set(of[first]["method"]):
+            made[name] = speeds[0] / speeds[1], "the calibrations, since no run was made on both"
+        else:
+            made[name] = np.nan, ""
+    return made
+
+
+def _times_of_runs(table: pd.DataFrame) -> pd.Series[float]:
+    """The median CPU time of each run that succeeded; of none where the table does not say."""
+    import pandas as pd
+
+    keys = ["problem", "name", "settings", "tolerance"]
+    if not {*keys, "success", "cpu_seconds"} <= {*table}:
+        return pd.Series(dtype=float, index=pd.MultiIndex.from_arrays([[]] * 4, names=keys))
+    return table[table["success"]].groupby(keys)["cpu_seconds"].median().clip(lower=NOISE)
+
+
+def _calibration(table: pd.DataFrame) -> float:
+    return float(table["calibration"].median()) if "calibration" in table else np.nan
+
+
+def machines_said(table: pd.DataFrame) -> list[str]:
+    """A sentence about each machine whose times were made comparable, or not."""
+    return [
+        f"Times on {name} are divided by {factor:.3g}, measured by {words}."
+        if np.isfinite(factor)
+        else f"No factor is known between {name} and the machine of most rows, since neither a run"
+        " nor all methods are common to both: nothing is ranked."
+        for name, (factor, words) in factors(table).items()
+    ]
+
+
+def unranked(table: pd.DataFrame) -> str:
+    """Why nothing is ranked; '' where something is."""
+    unknown = any(np.isnan(factor) for factor, _ in factors(table).values())
+    said = machines_said(table) if unknown else []
+    return " ".join([*filter(None, [warning(wall_over_cpu(table))]), *said])
+
+
 def points(table: pd.DataFrame) -> pd.DataFrame:
-    """A row per problem, method and tolerance: times [s], worst certificate, memory.
+    """A row per problem, method and tolerance: times [s] as on the machine of most rows, worst
+    certificate, memory.
 
     `counted` is CPU time, or wall time where that is above BUSY times CPU time: the method slept,
     or let somebody else compute.
     """
+    if known := {name: by for name, (by, _) in factors(table).items() if np.isfinite(by)}:
+        by = table["machine"].map(known).fillna(1.0)
+        table = table.assign(**{t: table[t] / by for t in ("cpu_seconds", "call_seconds")})
     memory = table["peak_mb"] - table["base_mb"] if "base_mb" in table else table["peak_mb"]
     joined = JOINED | {"memory": ("_memory", "max")}
     refused = table["status"] == REFUSED
@@ -136,7 +199,9 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
-    """The leader table of a report at a certificate; without ranks where the machine was busy."""
+    """The leader table of a report at a certificate; without ranks where the machine was busy, or
+    where machines cannot be compared.
+    """
     found = ranking(points(table), accuracy)
     shown = {
         "method": found["method"],
@@ -148,7 +213,7 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
         "memory [MB]": found["memory"],
         "certificate / asked": found["over claim"],
     }
-    if wall_over_cpu(table) <= BUSY:
+    if not unranked(table):
         bounds = zip(found["rank"], found["best"], found["worst"])
         shown = {"rank (95 %)": [f"{n} ({low} to {high})" for n, low, high in bounds]} | shown
     return found.assign(**shown)[list(shown)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import logging
 import math
 import re
 from collections import Counter
@@ -20,20 +21,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.benchmark.experiment import Experiment, read_layout
+from contactopt.benchmark.merging import joined
 from contactopt.benchmark.ranking import (
     NOISE,
     RESAMPLES,
     achieved,
     agreement,
     comparable,
+    factors,
     points,
     ranking,
     reruns,
+    unranked,
     wall_over_cpu,
-    warning,
 )
 from contactopt.benchmark.reports import write_report
-from contactopt.benchmark.store import ABSENT, load, require
+from contactopt.benchmark.store import ABSENT, require
 from contactopt.benchmark.testset import problems
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, write_html
@@ -49,6 +52,7 @@ MOST_POINTS = 30  # of a curve of convergence
 COLUMNS_SHOWN = (
     "tolerance", "residual", "claimed", "status", "cpu", "low", "high", "wall", "memory", "repeats",
 )  # fmt: skip
+_log = logging.getLogger(__name__)
 PROTOCOL = (
     "Methods are compared at the certificate that they reach, read off in logarithms between the"
     " tolerances asked. A certificate is computed here from the problem and the answer; what a"
@@ -79,7 +83,9 @@ def report_campaign(
     """
     require("markdown_it", "pandas")
     folder = Path(folder)
-    rows = joined(folder, others)
+    rows, said = joined(folder, others)
+    for sentence in said:
+        _log.warning("%s", sentence)
     table = rows[rows["status"] != ABSENT].reset_index(drop=True)
     if table.empty:
         raise InputError(f"'{folder}' holds no runs, so there is nothing to report.")
@@ -89,32 +95,10 @@ def report_campaign(
     layout = read_layout(path) if known else Experiment(name, title=name, path=path)
     if not (path.parent / layout.findings).is_file():  # beside a copy there is none
         layout = replace(layout, findings="")
-    text = write_report(layout, folder, table, figures)
+    text = write_report(layout, folder, table, figures, said)
     body = filled("report.html", title=html.escape(layout.title), static=_rendered(text, folder))
     data = page_data(table) | {"absent": _absent(rows)}
     return write_html(folder / PAGE, layout.title, body, data, ["report.js"])
-
-
-def joined(folder: Path, others: Sequence[str | Path]) -> pd.DataFrame:
-    """The rows of a campaign and those of others, whose methods are told apart by their file, and
-    whose times are divided by the geometric mean of the ratios for runs that both have made.
-    """
-    import pandas as pd
-
-    own = load(folder, absent=True).assign(source=folder.resolve().name, factor=1.0)
-    tables = [own]
-    for other in map(Path, others):
-        rows = load(other, absent=True)
-        pairs = own.merge(rows, on=["problem", "method", "setting", "repeat"])
-        pairs = pairs[pairs["success_x"] & pairs["success_y"]]
-        ratios = pairs["cpu_seconds_y"] / pairs["cpu_seconds_x"]
-        factor = float(np.exp(np.log(ratios).mean())) if len(pairs) else 1.0
-        for column in {"cpu_seconds", "call_seconds", "solve_seconds"} & {*rows}:
-            rows[column] = rows[column] / factor
-        known = rows["method"].isin(own["method"])
-        rows["method"] = rows["method"].where(~known, rows["method"] + f" ({other.stem})")
-        tables.append(rows.assign(source=other.stem, factor=factor))
-    return pd.concat(tables, ignore_index=True)
 
 
 def page_data(table: pd.DataFrame) -> dict[str, Any]:
@@ -131,7 +115,7 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
         [number[p], methods.index(m), *(_plain(value) for value in rest)]
         for p, m, *rest in found[["problem", "method", *COLUMNS_SHOWN]].itertuples(index=False)
     ]
-    ratio = wall_over_cpu(table)
+    divided = {name: by for name, (by, _) in factors(table).items()}
     return {
         "methods": methods,
         "order": list(first) + [name for name in methods if name not in set(first)],
@@ -152,8 +136,8 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
             for a in accuracies
         ],
         "histories": _histories(table, number, methods),
-        "cards": _cards(table),
-        "busy": warning(ratio),
+        "cards": _cards(table, divided),
+        "busy": unranked(table),
         "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(table, found)),
         "colours": COLOURS[:7],
     }
@@ -212,10 +196,12 @@ def _histories(own: pd.DataFrame, number: dict[str, int], methods: list[str]) ->
     return made
 
 
-def _cards(table: pd.DataFrame) -> list[dict[str, Any]]:
+def _cards(table: pd.DataFrame, divided: Mapping[str, float]) -> list[dict[str, Any]]:
     """Where rows come from: a card for each source, machine and set of versions."""
+    import pandas as pd
+
     made = []
-    sources = table if "source" in table else table.assign(source="", factor=1.0)
+    sources = table if "source" in table else table.assign(source="")
     for (source, machine, versions), rows in sources.groupby(["source", "machine", "versions"]):
         backends = {name for text in rows["backend"].fillna("") for name in text.split(", ")}
         made.append(
@@ -223,7 +209,8 @@ def _cards(table: pd.DataFrame) -> list[dict[str, Any]]:
                 "source": source,
                 "runs": len(rows),
                 "machine": machine,
-                "times divided by": _plain(rows["factor"].iloc[0]),
+                "times divided by": _plain(divided.get(machine, 1.0)),
+                "calibration [s]": _plain(rows.get("calibration", pd.Series(np.nan)).median()),
                 "wall over CPU": _plain(wall_over_cpu(rows)),
                 "versions": versions,
                 "external solvers": ", ".join(sorted(backends - {"", "native"})),

@@ -18,7 +18,7 @@ from contactopt.benchmark.entries import twice_in
 from contactopt.benchmark.experiment import Experiment, read_layout
 from contactopt.benchmark.keys import COLUMNS, USUAL
 from contactopt.benchmark.plugins import run_file
-from contactopt.benchmark.ranking import BUSY, wall_over_cpu
+from contactopt.benchmark.ranking import BUSY, machines_said, wall_over_cpu
 from contactopt.benchmark.report_figures import FIGURES
 from contactopt.benchmark.store import load, require, save
 from contactopt.benchmark.tables import TABLES, select
@@ -94,9 +94,16 @@ def build(experiments: Sequence[str | Path], reports: str | Path) -> list[Experi
 
 
 def write_report(
-    layout: Experiment, folder: Path, table: pd.DataFrame, formats: Sequence[str] = ()
+    layout: Experiment,
+    folder: Path,
+    table: pd.DataFrame,
+    formats: Sequence[str] = (),
+    said: Sequence[str] = (),
 ) -> str:
-    """Write report.md into a folder, and its pictures as PNG and in more formats; its Markdown."""
+    """Write report.md into a folder, and its pictures as PNG and in more formats; its Markdown.
+
+    said  sentences about the rows, which stand at its end
+    """
     parts = [f"# {_one_line(layout.title)}", layout.text.strip()]
     if layout.findings:
         found = enumerate(_findings(layout, table), 1)
@@ -116,7 +123,7 @@ def write_report(
                 for ending in {*formats} - {"png"}:
                     save_figure(result, made / f"figure-{number}.{ending}")
                 parts += [f"![{plain}]({picture})", f"*Figure {number}. {caption}*"]
-        parts.append(_foot(layout, folder, table))
+        parts.append("\n".join([_foot(layout, folder, table), *said]))
         text = "\n\n".join(part for part in parts if part) + "\n"
         (made / "report.md").write_text(text, encoding="utf-8")
     return text
@@ -178,12 +185,7 @@ def _foot(layout: Experiment, folder: Path, table: pd.DataFrame) -> str:
         f"Made by {made}.",
         _one_line(f"Environment: {machines}. {versions}. One BLAS thread."),
     ]
-    if (number := table["machine"].nunique()) > 1:
-        lines.insert(
-            1,
-            f"**These rows come from {number} machines.** The times of one machine say nothing"
-            " about those of another: compare only methods that ran on the same machine.",
-        )
+    lines[1:1] = machines_said(table)
     return "\n".join(lines + ([f"Backends: {', '.join(sorted(backends))}."] if backends else []))
 
 

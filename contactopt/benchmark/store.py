@@ -11,10 +11,12 @@ import json
 import logging
 import os
 import tempfile
-from collections.abc import Iterator
+import warnings
+from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -30,8 +32,11 @@ if TYPE_CHECKING:
 SCHEMA = 1  # of COLUMNS; a reader refuses newer ones
 
 STATUSES = {status.label: status.sentence for status in Status} | ENDS
+TYPES = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}  # in a table
 REFERENCE = 1e-8  # largest residual of a reference solution
 UNKNOWN = {"int": 0, "str": "", "float": np.nan, "bool": False}  # what stands for no value yet
+LATER = ("error", "calibration")  # columns that load() works out, or that older rows do not have
+ANSWERS = "answers.npz"  # beside the table
 ABSENT = "absent"  # status of the row of a method that is not there
 _log = logging.getLogger(__name__)
 
@@ -136,7 +141,7 @@ def _wrong(row: Any) -> str:
     if not isinstance(row, dict):
         return "this is no row"
     for name, (kind, _) in COLUMNS.items():
-        if name != "error" and not _is(row.get(name), kind):  # which load() works out
+        if name not in LATER and not _is(row.get(name), kind):
             return f"the row has no '{name}' of the kind {kind}"
     try:
         _unpack(row.get("answer", ""))
@@ -154,13 +159,49 @@ def _is(value: Any, kind: str) -> bool:
     return isinstance(value, kinds[kind]) and (kind == "bool" or not isinstance(value, bool))
 
 
-def pack(reactions: np.ndarray) -> str:
-    """The bytes of forces (k, dim) as text, in base64."""
-    return base64.b64encode(np.ascontiguousarray(reactions, dtype=float).tobytes()).decode()
+def _is_table(value: Any, kind: str) -> bool:
+    """Whether a value is a text that holds a table of JSON, or nothing."""
+    try:
+        return _is(value, kind) and isinstance(json.loads(value or "{}"), dict)
+    except (ValueError, RecursionError):
+        return False
+
+
+def pack(reactions: np.ndarray, multipliers: np.ndarray | None = None) -> str:
+    """The bytes of forces (k, dim) and then of multipliers (p,) as text, in base64."""
+    parts = [np.ravel(part) for part in (reactions, multipliers) if part is not None]
+    return base64.b64encode(np.concatenate(parts).astype(float).tobytes()).decode()
 
 
 def _unpack(text: str) -> np.ndarray:
     return np.frombuffer(base64.b64decode(text))
+
+
+def save_answers(folder: Path) -> None:
+    """Write the answers of a campaign into a file beside its table: key of the row -> forces and
+    then multipliers, flat.
+    """
+    with whole_file(folder / ANSWERS) as file, open(file, "wb") as open_file:
+        np.savez_compressed(open_file, **_answers_in(folder / "rows.jsonl"))
+
+
+def answers(path: Path) -> dict[str, np.ndarray]:
+    """The answers beside a table, as `save_answers` writes them; those of its lines without the
+    file. InputError if the file cannot be read.
+    """
+    folder = path if path.is_dir() else path.parent
+    file, rows = folder / ANSWERS, folder / "rows.jsonl"
+    if not file.exists():
+        return _answers_in(rows) if rows.exists() else {}
+    try:
+        with np.load(file) as found:
+            return dict(found)
+    except (OSError, ValueError, TypeError, BadZipFile) as error:
+        raise InputError(f"cannot read the answers '{file}': {error}") from error
+
+
+def _answers_in(path: Path) -> dict[str, Any]:
+    return {row["key"]: _unpack(row["answer"]) for row in lines(path) if row.get("answer")}
 
 
 def load(path: str | Path, absent: bool = False) -> pd.DataFrame:
@@ -196,11 +237,9 @@ def load(path: str | Path, absent: bool = False) -> pd.DataFrame:
         if path.suffix == ".jsonl":
             table = _from_lines(path)
         elif path.suffix == ".parquet":
-            table = pd.read_parquet(path)
+            table = _of_their_kinds(pd.read_parquet(path), path, "row", 1)
         else:
-            texts = {name: "str" for name, (kind, _) in COLUMNS.items() if kind == "str"}
-            empty = {name: ["", "nan"] for name in COLUMNS if name not in texts}
-            table = pd.read_csv(path, dtype=texts, keep_default_na=False, na_values=empty)
+            table = _from_text(path)
         if len(table) and int(table["schema"].max()) > SCHEMA:
             raise InputError(f"'{path}' was written by a newer version; update contactopt.")
         if not absent:
@@ -220,6 +259,44 @@ def load(path: str | Path, absent: bool = False) -> pd.DataFrame:
     return table
 
 
+def _from_text(path: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        table = pd.read_csv(path, dtype=str, keep_default_na=False, on_bad_lines="warn")
+    for warning in said:
+        _log.warning("'%s': %s", path, str(warning.message).strip())
+    return _of_their_kinds(table, path, "line", 2)
+
+
+def _of_their_kinds(table: pd.DataFrame, path: Path, word: str, first: int) -> pd.DataFrame:
+    """A table with values of the kinds of COLUMNS; rows with others are left out, with a warning
+    that names the first of them, counted from `first`.
+    """
+    import pandas as pd
+
+    wrong = pd.Series("", index=table.index)
+    for name in [name for name in table if name in COLUMNS]:
+        kind, column = COLUMNS[name][0], table[name]
+        if kind == "str":
+            readable = _is_table if name in ("parameters", "settings") else _is
+            bad = ~column.map(lambda value, readable=readable: readable(value, "str"))
+        elif kind == "bool":
+            table[name] = column.map({"True": True, "False": False, True: True, False: False})
+            bad = table[name].isna()
+        else:
+            empty = column.isna() | column.isin(["", "nan"])
+            table[name] = pd.to_numeric(column, errors="coerce")
+            bad = table[name].isna() & ~empty if kind == "float" else table[name] % 1 != 0
+        wrong = wrong.mask(bad & (wrong == ""), f"the row has no '{name}' of the kind {kind}")
+    for index, why in wrong[wrong != ""].items():
+        _log.warning("'%s', %s %d: %s; it is left out", path, word, index + first, why)
+    table = table[wrong == ""].reset_index(drop=True)
+    types = {name: TYPES[COLUMNS[name][0]] for name in table if name in COLUMNS}
+    return table.astype(types)
+
+
 def _from_lines(path: Path) -> pd.DataFrame:
     import pandas as pd
 
@@ -227,17 +304,21 @@ def _from_lines(path: Path) -> pd.DataFrame:
     exact: dict[str, np.ndarray] = {}  # the best answer to each problem
     good = [row for row in rows.values() if row["residual"] <= REFERENCE and row.get("answer")]
     for row in sorted(good, key=lambda row: row["residual"]):
-        exact.setdefault(row["fingerprint"], _unpack(row["answer"]))
+        exact.setdefault(row["fingerprint"], _forces(row))
     for row in rows.values():
-        answer, row["error"] = row.pop("answer", ""), np.nan
+        found, row["error"] = _forces(row), np.nan
         reference = exact.get(row["fingerprint"])
-        if answer and reference is not None:
-            found, size = _unpack(answer), float(np.linalg.norm(reference))
+        if found.size and reference is not None:
+            size = float(np.linalg.norm(reference))
             if size > 0 and found.shape == reference.shape:
                 row["error"] = float(np.linalg.norm(found - reference)) / size
-    types = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}
     table = pd.DataFrame(list(rows.values()), columns=list(COLUMNS))
-    return table.astype({name: types[kind] for name, (kind, _) in COLUMNS.items()})
+    return table.astype({name: TYPES[kind] for name, (kind, _) in COLUMNS.items()})
+
+
+def _forces(row: Mapping[str, Any]) -> np.ndarray:
+    """The forces of a row's answer, flat, without the multipliers behind them."""
+    return _unpack(row.get("answer", ""))[: row["contacts"] * row["dim"]]
 
 
 def save(table: pd.DataFrame, path: str | Path, columns: list[str] | None = None) -> None:

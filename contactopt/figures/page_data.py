@@ -35,8 +35,9 @@ TURNS = 0.5  # length of the mean of unit normals below which a surface goes aro
 SHARP = np.cos(np.deg2rad(30))
 ROUNDING = 1e-12  # of a surface, below which a gap or a slip is what rounding leaves of zero
 ON_PLANE = 1e-9  # of the size of a body, within which a node lies in a plane of symmetry
-# nodes of all bodies in space, up to which the page holds their inside, so that it can be cut
-MOST_INSIDE = 40_000
+# nodes of all bodies in space, up to which the page holds their inside, so that it can be cut: such
+# a page has at most 4 MB
+MOST_INSIDE = 25_000
 
 
 def page_data(folder: Path, summary: dict[str, Any]) -> dict[str, Any]:
@@ -197,7 +198,10 @@ def body_arrays(
     nodes = np.arange(len(mesh.points)) if inside else np.unique(faces)
     place = np.zeros(len(mesh.points), dtype=int)
     place[nodes] = np.arange(len(nodes))
-    shown = {name: _packed(value[:, nodes]) for name, value in values.items()}
+    shown = {
+        name: (packed_short if name.startswith(("lift", "stress_")) else _packed)(value[:, nodes])
+        for name, value in values.items()
+    }
     return {
         "points": packed(mesh.points[nodes]),
         "move": shown.pop("move"),
@@ -260,7 +264,7 @@ def _contact(
     return {
         "points": packed(mesh.points),
         "move": _packed(motion[0]),
-        "lift": packed(motion[1]),
+        "lift": packed_short(motion[1]),
         "cells": packed(flat),
         "lines": packed(block.data if line else np.zeros((0, 2), dtype=int)),
         "normal": (mean / size).tolist() if size > TURNS else None,
