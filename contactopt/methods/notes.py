@@ -12,7 +12,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
-from contactopt.linear.operators import InterfaceOperator, form
+from contactopt.linear.operators import form, has_entries
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.certificate import amplification
 from contactopt.problem.scaling import immovable
@@ -77,7 +77,7 @@ def exchanging(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray |
     """
     Q, (k, dim), r = problem.Q, problem.q.shape, reactions
     places = problem.coordinates.T
-    if isinstance(Q, InterfaceOperator) or places.shape[0] != k or k < 3:
+    if not has_entries(Q) or places.shape[0] != k or k < 3:
         return None
     size = np.ptp(places, axis=0).max(initial=0.0)
     normal = INSIDE * np.abs(r[:, 0]).max(initial=0.0)
@@ -91,7 +91,7 @@ def exchanging(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray |
     )[1:]
     for cell in np.flatnonzero(counts > 2):
         own = np.flatnonzero(np.repeat(cells == cell, dim) & free.ravel())
-        columns = Q[:, own] if isinstance(Q, np.ndarray) else Q[:, own].toarray()
+        columns = Q[:, own] if form(Q) == "array" else Q[:, own].toarray()
         felt = np.vstack([columns / (np.abs(columns).max(initial=0.0) or 1.0), problem.V[own].T])
         if len(own) and np.linalg.svd(felt, compute_uv=False)[-1] <= UNFELT:
             return np.asarray(places[np.flatnonzero(cells == cell)[0]])
