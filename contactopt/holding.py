@@ -47,7 +47,8 @@ from contactopt.methods.driver import solve
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.scaling import scales_of
 from contactopt.runner import states_of
-from contactopt.scenes.scene import BodyForce, Part, Plate, Scene
+from contactopt.scenes.loads import Load
+from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.follow import follow_path
 from contactopt.solving.solve_scene import Options
 
@@ -141,16 +142,15 @@ def _rows(scene: Scene) -> dict[str, tuple[float, bool]]:
     found: dict[str, tuple[float, bool]] = {}
     for part in scene.parts:
         for load in getattr(part, "loads", ()):
-            total = isinstance(load, Plate)
-            own = load.force if total else dict(zip(scene.components, load.value))
-            found |= {f"{part.name}:{_place(load)}:{c}": (own[c], total) for c in own}
+            own, place = load.values(scene.components), f"{part.name}:{_place(load)}"
+            found |= {f"{place}:{c}".rstrip(":"): (own[c], load.level) for c in own}
         whole = getattr(part, "force", None) or {}
         found |= {f"{part.name}:force:{c}": (whole[c], True) for c in whole}
     return found
 
 
-def _place(load: Any) -> str:
-    return "body_force" if isinstance(load, BodyForce) else load.boundary
+def _place(load: Load) -> str:
+    return load.boundary or "body_force"
 
 
 def _belongs(name: str, load: str) -> bool:
@@ -178,12 +178,8 @@ def _without(scene: Scene, load: str) -> Scene:
     def left(name: str, own: Mapping[str, float]) -> dict[str, float]:
         return {c: 0.0 if _belongs(f"{name}:{c}", load) else own[c] for c in own}
 
-    def eased(name: str, own: Any) -> Any:
-        if isinstance(own, Plate):
-            return replace(own, force=left(name, own.force))
-        return replace(
-            own, value=tuple(left(name, dict(zip(scene.components, own.value))).values())
-        )
+    def eased(name: str, own: Load) -> Load:
+        return own.with_values(left(name, own.values(scene.components)))
 
     def changed(part: Any) -> Any:
         if isinstance(part, Part):

@@ -304,3 +304,30 @@ def test_small_elements_far_from_the_origin_keep_their_areas(dim, degree):
     ]
     for here, there in zip(*found):
         assert abs(there - here).max() < 1e-8
+
+
+@pytest.mark.parametrize("scale, off", [(1.0, 0.0), (1e-3, 100.0)])
+def test_a_traction_on_bricks_of_second_order_wherever_they_are(scale, off):
+    """Bricks of any shape, small and far from the origin: the force is the traction times the area
+    of the side, and its moment that of an even pressure.
+    """
+    mesh = skfem.MeshHex().refined(1)
+    inside = np.all((mesh.p > 0) & (mesh.p < 1), axis=0)
+    p = scale * (mesh.p + np.where(inside, 0.13, 0.0)) + off
+    mesh = skfem.MeshHex2.from_mesh(skfem.MeshHex(p, mesh.t))
+    sides = {"top": 1.0, "foot": 0.0}
+    mesh = mesh.with_boundaries(
+        {
+            name: lambda x, at=at: abs(x[2] - off - at * scale) < 1e-3 * scale
+            for name, at in sides.items()
+        }
+    )
+    loads = (Traction("top", (1.0, 2.0, 3.0)),)
+    part = Part("brick", mesh, MATERIAL, loads=loads, contact="foot")
+    scene = Scene("s", part, Rigid("floor"), 0.0, kind="solid", copies=2)
+    body = build_body(scene, part, 1, None)
+    rows = body.load[body.unknowns]
+    total = 2 * scale**2 * np.array([1.0, 2.0, 3.0])
+    np.testing.assert_allclose(rows.sum(axis=1), total, rtol=1e-9)
+    places = body.locations[:2] - off
+    np.testing.assert_allclose(places @ rows[2] / total[2], np.full(2, scale / 2), rtol=1e-9)

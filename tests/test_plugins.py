@@ -39,6 +39,7 @@ KINDS = {
     "scene": Kind("A scene", "run block --elements 4"),
     "method": Kind("A method", "run punch-2d --mu 0.2 --elements 4 --tol 1e-3 --method projection"),
     "law": Kind("A law"),
+    "load": Kind("A load", listed=False),
     "coupling": Kind("A coupling", listed=False),
     "preconditioner": Kind(
         "A preconditioner", "run punch-2d --elements 8 --q implicit --preconditioner fourier"

@@ -22,6 +22,7 @@ from contactopt.bodies.elements import (
     make_basis,
     node_unknowns,
     nodes_on,
+    surface_load,
     weight_at,
 )
 from contactopt.bodies.motions import check_free, free_motions
@@ -198,14 +199,16 @@ def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:
     for load in part.loads:
         if load.level:
             continue
+        if load.boundary:
+            total += surface_load(basis, basis.mesh.boundaries[load.boundary], load.density, weight)
+            continue
 
         @skfem.LinearForm
         def form(v, w, load=load):  # type: ignore[no-untyped-def]
             x = np.asarray(w.x)
-            return dot(load.density(x, w.n if load.boundary else x), v) * weight_at(weight, x)
+            return dot(load.density(x, x), v) * weight_at(weight, x)
 
-        where = basis.boundary(load.boundary) if load.boundary else basis
-        total += form.assemble(where)
+        total += form.assemble(basis)
     return total
 
 

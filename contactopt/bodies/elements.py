@@ -20,7 +20,7 @@ SIAM J. Sci. Comput. 34, B421-B446.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -57,7 +57,9 @@ TIED = {
     "RefTri": FACES["RefQuad"][3],
     "RefTet": np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]]),
 }
+Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
+SMOOTH = 6  # order of the quadrature of a load on curved faces
 NOISE = 1e-14  # what rounding leaves of a zero
 
 
@@ -246,6 +248,22 @@ def opposed(place: np.ndarray) -> str:
         f"facets face opposite ways at ({text(place)}), so that the boundary has no"
         " normal there; make a boundary of each side, with a contact of its own."
     )
+
+
+def surface_load(
+    basis: skfem.CellBasis, boundary: np.ndarray, density: Density, weight: Weight
+) -> np.ndarray:
+    """The forces (N,) on the unknowns of a load on facets (f,), of a density [stress] at places and
+    their outward normals.
+    """
+    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], SMOOTH)
+    at = Faces(basis.mesh, np.asarray(boundary), points)
+    places = at.places
+    measure = at.scale * share * weight_at(weight, places)
+    stress = np.broadcast_to(density(places, at.normals), places.shape)
+    forces = np.einsum("fiq,dfq,fq->idf", at.values(basis.elem.elem), stress, measure)
+    dofs = basis.element_dofs[:, at.owner]  # of all components of the first shape function, ...
+    return np.bincount(dofs.ravel(), forces.ravel(), minlength=basis.N)
 
 
 def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:

@@ -268,6 +268,8 @@ class PressedScene:
         for load in part.loads:
             if load.level:
                 holding.append((load.boundary, None if load.glued else load.force))
+            elif "" in load.values(components):
+                raise InputError(f"body '{part.name}': a bound does not know a {load.what}.")
             elif load.boundary and loaded:
                 own = np.asarray(mesh.boundaries[load.boundary])
                 size = (areas * lever).T[own, :, None] / d

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
+from contactopt.bodies.elements import FACES, Faces
 from contactopt.cards import force_unit
 from contactopt.figures.html import filled, packed, remark_list, write_html
 from contactopt.figures.page_data import MOST_INSIDE, body_arrays, box_of, whole_box
@@ -213,11 +214,10 @@ def _boundaries(
             continue  # the pairs show it
         places, vector = item["places"], item["vector"]
         if load:
-            told = load.values(scene.components)
+            vector[:, : scene.dim] = load.density(*_normals(mesh, mesh.boundaries[name])).T
+        if load and load.level:
             middle = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
-            vector[middle if load.level else slice(None), : scene.dim] = [
-                told.get(c, 0.0) for c in scene.components
-            ]
+            vector[middle, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
         size = float(np.ptp(mesh.p, axis=1).max())
         if any(np.ptp(places[:, a]) <= 1e-9 * size >= abs(places[0, a] - x) for a, x in planes):
             item["hidden"] = True
@@ -240,6 +240,18 @@ def _boundaries(
                 "role": 2,
                 "vector": _spatial(force[:, None]),
             }
+
+
+def _normals(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places of the nodes of facets, and outward normals there (dim, m), zero within edges."""
+    corners = mesh.facets[:, facets]
+    places = FACES[mesh.refdom.__name__][2][:, : len(corners)]
+    sums = np.zeros(mesh.doflocs.shape)
+    for own, n in zip(corners, np.moveaxis(Faces(mesh, facets, places).normals, 2, 0)):
+        np.add.at(sums.T, own, n.T)
+    nodes = facet_nodes(mesh, facets)
+    length = np.linalg.norm(sums[:, nodes], axis=0)
+    return mesh.doflocs[:, nodes], sums[:, nodes] / np.where(length > 0, length, 1.0)
 
 
 def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:

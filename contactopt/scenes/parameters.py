@@ -10,6 +10,7 @@
     displacement:BODY:BOUNDARY:COMPONENT     of a support [length]; of a rigid body or half-space
                                              without the boundary
     traction:BODY:BOUNDARY:COMPONENT         surface force per area [stress]
+    pressure:BODY:BOUNDARY                   pressure along the normals [stress]
     weight:BODY:COMPONENT                    force per volume [force / length^3]
     gap                                      the initial gap, one number per contact (k,) [length];
                                              gradients only
@@ -186,9 +187,10 @@ def parameter(name: Any, scene: Scene) -> Parameter:
     kind, *rest = name.split(":")
     if kind in FIELDS and not rest:
         return Parameter(name, kind)
-    if kind in (*MATERIAL, "mu") and len(rest) <= 1:
+    plain = kind in FORM and "COMPONENT" not in FORM[kind]  # a number without a direction
+    if len(rest) == 2 if plain else kind in (*MATERIAL, "mu") and len(rest) <= 1:
         made = Parameter(name, kind, *rest)
-    elif kind in FORM and len(rest) in (2, 3):
+    elif "COMPONENT" in FORM.get(kind, "") and len(rest) in (2, 3):
         made = Parameter(name, kind, rest[0], rest[1] if len(rest) == 3 else "", rest[-1])
         if made.component not in scene.components:
             raise InputError(

@@ -19,6 +19,7 @@ from contactopt.scenes.contact import Contact
 from contactopt.scenes.kinds import KINDS, Kind
 from contactopt.scenes.loads.body_force import BodyForce
 from contactopt.scenes.loads.plate import Plate
+from contactopt.scenes.loads.pressure import Pressure
 from contactopt.scenes.loads.traction import Traction
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "HalfSpace",
     "Part",
     "Plate",
+    "Pressure",
     "Rigid",
     "Scene",
     "Support",

@@ -100,7 +100,8 @@ def read_scenes(
         )
     where = top.lines.get(("contacts",), 0)  # of those that are found
     lines = {c.name: top.lines.get(("contacts", i), where) for i, c in enumerate(first.contacts)}
-    lines |= {part.name: top.lines["bodies", part.name] for part in first.bodies}
+    known = [own.name for own in first.bodies if ("bodies", own.name) in top.lines]
+    lines |= {name: top.lines["bodies", name] for name in known}
     return tuple(states), solve, lines
 
 

@@ -133,13 +133,16 @@ def _cells(cells: np.ndarray) -> np.ndarray:
 
 
 class _Condition(NamedTuple):
-    """A support, load, force or normal by words, boundary, projection (dim, dim), values (dim,)."""
+    """A support, load, force or normal by words, boundary, projection (dim, dim), values (dim,),
+    and a number that no reflection changes.
+    """
 
     kind: str
     where: str
     space: np.ndarray
     values: np.ndarray
     item: Any
+    number: float = 0.0
 
 
 def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
@@ -153,8 +156,9 @@ def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
         return
     for item in (*part.supports, *part.loads):
         kind = item.what + ("" if getattr(item, "glued", True) else " that slides")
-        space = held_space(components, item.values(components))
-        yield _Condition(kind, item.boundary, *space, item)
+        values = item.values(components)
+        space = held_space(components, values)
+        yield _Condition(kind, item.boundary, *space, item, values.get("", 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,6 +209,7 @@ class _Comparison:
                 same = one.kind == two.kind and bool(
                     np.allclose(H @ one.space @ H, two.space, atol=EQUAL)
                     and np.all(np.abs(H @ one.values - two.values) <= EQUAL * size)
+                    and np.isclose(one.number, two.number, EQUAL, 0.0)
                 )
                 if same and (not one.where or self.fits(part.name, one.where, two.where)):
                     if one.item is two.item and getattr(one.item, "level", False):

@@ -97,14 +97,17 @@ def _spoils(prism: _Prism) -> str:
     whole, component = prism.whole, prism.whole.scene.components[prism.axis]
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]
-        ends = np.concatenate([prism.on_end(mesh, place) for place in prism.ends])
+        ends = both = np.concatenate([prism.on_end(mesh, place) for place in prism.ends])
         for support in part.supports:
             if (support.displacement or {}).get(component) == 0:
                 ends = np.setdiff1d(ends, mesh.boundaries[support.boundary])
         if len(ends):
             return f"the ends of body '{name}' are not held along the axis"
         for load in part.loads:
-            if load.values(whole.scene.components).get(component):
+            values, acting = load.values(whole.scene.components), both[:0]
+            if "" in values:
+                acting = np.intersect1d(both, mesh.boundaries[load.boundary])
+            if values.get(component) or len(acting):
                 where = f" on {load.boundary!r}" if load.boundary else ""
                 return f"the {load.what}{where} of body '{name}' acts along the axis"
     for pair in whole.scene.pairs:
@@ -142,7 +145,7 @@ def _simplification(prism: _Prism, component: str) -> Simplification:
 def _flattened(prism: _Prism) -> Scene:
     """The scene on its section: vectors and components without those along the axis."""
     scene, axes = prism.whole.scene, prism.axes
-    names = {scene.components[old]: new for old, new in zip(axes, "xy")}
+    names = {scene.components[old]: new for old, new in zip(axes, "xy")} | {"": ""}
 
     def values(old: Mapping[str, float] | None) -> Any:
         return None if old is None else {names[c]: v for c, v in old.items() if c in names}

@@ -114,6 +114,7 @@ def _scenes(kind: str) -> list[dict[str, Any]]:
         }
         body["supports"] = [{"boundary": "c"} | along, {"boundary": "c"} | path]
         body["tractions"] = [{"boundary": "c"} | path]
+        body["pressures"] = [{"boundary": "c", "pressure": [0.0, 1.0]}]
         body["plates"] = [{"boundary": "c", "force": along}]
         body |= {"body_force": path, "curve": {"radius": 1, "centre": along}}
         own = {"materials": {"soft": material}, "steps": [{"name": "press"}, {"name": "push"}]}

@@ -9,6 +9,7 @@ from contactopt.scenes.loads.load import Load
 # name of its tables in a scene file -> (module, class)
 LOADS = {
     "tractions": ("traction", "Traction"),
+    "pressures": ("pressure", "Pressure"),
     "plates": ("plate", "Plate"),
     "body_force": ("body_force", "BodyForce"),
 }
