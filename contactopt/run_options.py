@@ -91,9 +91,9 @@ class Option(NamedTuple):
     and what it is.
     """
 
-    annotation: Any
+    annotation: object
     kind: type
-    default: Any
+    default: object
     value: str
     what: str
 

@@ -10,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from contactopt.benchmark.cluster import run_on_cluster, shard_of
 from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
 from contactopt.benchmark.measure import Task, absent_row, calibration
 from contactopt.benchmark.pool import History, run_locally
@@ -40,6 +41,8 @@ def run_campaign(
     resume: bool = False,
     filters: Sequence[str] = (),
     quiet: bool = False,
+    shard: str = "",
+    scheduler: str = "",
 ) -> Path:
     """Execute the runs of an experiment that are not finished yet.
 
@@ -51,6 +54,10 @@ def run_campaign(
     resume : Whether to go on where an interrupted campaign stopped. No finished run is repeated.
     filters : "COLUMN=PATTERN" on problem, method, setting or repeat; all must match.
     quiet : Whether no progress is shown.
+    shard : "i/n": only the runs of every n-th problem from the i-th on, by default in
+        out/bench/NAME-i-of-n. `contactopt report --merge` joins the shards.
+    scheduler : The address of a Dask scheduler, whose workers make the runs instead of `jobs`
+        processes here.
 
     Returns
     -------
@@ -65,10 +72,12 @@ def run_campaign(
     e = experiment if isinstance(experiment, Experiment) else read_experiment(experiment)
     jobs = jobs if jobs is not None else os.cpu_count() or 1
     check_count("jobs", jobs)
-    folder = Path("out/bench", e.name) if out is None else Path(out)
     runs = e.runs(filters)
     if not runs:
         raise InputError("no run matches the filters.")
+    runs = shard_of(runs, shard) if shard else runs
+    name = e.name + (f"-{shard.replace('/', '-of-')}" if shard else "")
+    folder = Path("out/bench", name) if out is None else Path(out)
     for sentence in () if quiet else dict.fromkeys(e.skipped):  # once for each reason
         print(f"left out: {sentence}", file=sys.stderr)
     calibration()  # before others compute here
@@ -84,7 +93,13 @@ def run_campaign(
         left = [run for run in runs if run.key not in finished]
         tasks = [Task(run, e.name, e.plugins, *limits) for run in left]
         bar = progress(e.name, len(runs), len(runs) - len(tasks), quiet)
-        with closing(run_locally(tasks, jobs, History(lines(store.path)))) as rows, bar as shown:
+        known = History(lines(store.path))
+        made = (
+            run_on_cluster(scheduler, tasks, known)
+            if scheduler
+            else run_locally(tasks, jobs, known)
+        )
+        with closing(made) as rows, bar as shown:
             _keep(rows, store, shown)
         store.keep_own()
         save(load(store.path, absent=True), folder / "rows.parquet")
@@ -92,10 +107,10 @@ def run_campaign(
     return folder
 
 
-def _keep(rows: Iterable[dict[str, Any]], store: Store, shown: Lines) -> None:
+def _keep(rows: Iterable[dict[str, Any] | None], store: Store, shown: Lines) -> None:
     """Store the rows as they come, and show the progress."""
     failed: Counter[str] = Counter()
-    for row in rows:
+    for row in filter(None, rows):
         store.append(row)
         if not row["success"]:
             failed[row["status"]] += 1

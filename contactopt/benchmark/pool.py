@@ -61,6 +61,14 @@ class Worker:
         self.builder.interrupt()
         self.solver.interrupt()
 
+    def row(self, task: Task, known: History) -> dict[str, Any] | None:
+        """The row of this run, which `known` then knows; None if it needs no repeat."""
+        if known.repeated(task.run):
+            return None
+        row = self.run(task, known.hopeless(task.run))
+        known.add(row)
+        return row
+
     def run(self, task: Task, hopeless: bool = False) -> dict[str, Any]:
         """The row of this run, whatever happens to the processes; a `hopeless` one is not made."""
         row = blank(task)
@@ -207,8 +215,9 @@ class History:
 
 def run_locally(
     tasks: Sequence[Task], jobs: int, history: History | None = None
-) -> Generator[dict[str, Any]]:
-    """The row of each run as it is finished, made by `jobs` workers.
+) -> Generator[dict[str, Any] | None]:
+    """The row of each run as it is finished, None for one that is not repeated, made by `jobs`
+    workers.
 
     `history` knows the rows that were made before. When the iteration is left, the workers are
     killed.
@@ -220,12 +229,7 @@ def run_locally(
     def serve(worker: Worker) -> None:
         try:
             while not stop.is_set() and (task := shares.take(worker)) is not None:
-                if known.repeated(task.run):
-                    rows.put(None)
-                    continue
-                row = worker.run(task, known.hopeless(task.run))
-                known.add(row)
-                rows.put(row)
+                rows.put(worker.row(task, known))
         except BaseException as error:
             rows.put(error)
         finally:  # Linux kills a process with the thread that started it: it is ended before, whole
@@ -239,8 +243,7 @@ def run_locally(
             row = rows.get()
             if isinstance(row, BaseException):
                 raise row
-            if row is not None:
-                yield row
+            yield row
     finally:
         stop.set()
         for worker in workers:

@@ -41,11 +41,11 @@ ABSENT = "absent"  # status of the row of a method that is not there
 _log = logging.getLogger(__name__)
 
 
-def require(*modules: str) -> None:
+def require(*modules: str, extra: str = "benchmark") -> None:
     """InputError, with what to install, if one of these packages is missing."""
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
-        raise InputError(f"benchmarks need {', '.join(missing)}; {install('benchmark')}.")
+        raise InputError(f"benchmarks need {', '.join(missing)}; {install(extra)}.")
 
 
 class Store:

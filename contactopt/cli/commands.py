@@ -227,6 +227,8 @@ def bench(options: argparse.Namespace) -> int:
             resume=options.resume,
             filters=options.filter,
             quiet=options.quiet,
+            shard=options.shard,
+            scheduler=options.scheduler,
         )
     except KeyboardInterrupt:
         print(

@@ -33,7 +33,7 @@ class Gradient:
     by: dict[str, Any]
     weak: tuple[tuple[int, Weak], ...]
     chain: Chain
-    quantity: Any
+    quantity: object
 
     @property
     def differentiable(self) -> bool:

@@ -262,7 +262,7 @@ def chain_of(result: Any, distance: float | None = None) -> Chain:
     return Chain(tuple(steps))
 
 
-def _one_per_contact(which: Parameter, amount: Any, contacts: int) -> np.ndarray:
+def _one_per_contact(which: Parameter, amount: object, contacts: int) -> np.ndarray:
     array = real_array(f"the change of '{which.name}'", amount)
     if array.shape not in ((), (contacts,)):
         raise InputError(

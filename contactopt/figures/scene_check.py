@@ -24,7 +24,7 @@ from contactopt.coupling.posed import Posed, posed, problem_of
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.unbalanced_loads import escape, loose_names, sentence, sorted_motions
+from contactopt.problem.unbalanced_loads import escape, resisted, sentence
 from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
@@ -162,8 +162,7 @@ def _balance(states: Sequence[Scene], made: Posed, free: InterfaceProblem) -> li
             found.append(where + sentence(problem, gone))
     if found or not free.motions:
         return found[:1]
-    names = loose_names(free, sorted_motions(free)[1])
-    return [f"neither supports nor contacts resist a motion of {name}" for name in names]
+    return [said] if (said := resisted(free)[2]) else []
 
 
 def _posed_again(state: Scene, made: Posed) -> Posed:

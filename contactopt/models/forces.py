@@ -262,7 +262,7 @@ def _parts(problem: InterfaceProblem) -> tuple[Any, Any, Any, Any, Any, list[Any
 
 
 def _friction(
-    problem: InterfaceProblem, r_t: Any, g: Any, facets: int | None
+    problem: InterfaceProblem, r_t: object, g: object, facets: int | None
 ) -> tuple[Any, Reader, Reader]:
     """|t_i| <= g_i for r_t (k d,), the reader of the slip u_t (k, d) and that of the multiplier of
     g (k,).

@@ -159,7 +159,7 @@ def _stiffness(Q: np.ndarray, name: str = "S") -> Any:
         ) from error
 
 
-def _slip(problem: InterfaceProblem, u_t: Any, facets: int | None) -> Any:
+def _slip(problem: InterfaceProblem, u_t: object, facets: int | None) -> Any:
     """|u_t| (k,): the largest work that the forces of the unit disc, or of its polygon, resist."""
     u = columns(blockwise(problem.law.stretch(problem.dim), u_t), problem.contacts)
     reach = corners(facets, problem.dim)

@@ -276,7 +276,7 @@ def _compliance(Q: Any, n: int) -> Interface:
     return Q
 
 
-def _chart(chart: Any, coordinates: np.ndarray, shape: tuple[int, int]) -> Chart:
+def _chart(chart: object, coordinates: np.ndarray, shape: tuple[int, int]) -> Chart:
     if chart is None:
         return Chart.of_points(coordinates, shape[0] + 1)
     if not isinstance(chart, Chart):

@@ -116,7 +116,7 @@ def quantity_of_states(name: Any, states: Sequence[Scene]) -> Quantity:
     return found
 
 
-def seeds_of(quantity: Any, state: State) -> Seeds:
+def seeds_of(quantity: object, state: State) -> Seeds:
     """The value of a quantity of a solved state and its derivatives, by its name or as a function
     of the state that returns Seeds.
     """
