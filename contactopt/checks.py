@@ -25,6 +25,8 @@ RESERVED = {
     *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10)),
 }
 LONGEST_NAME = 100  # characters
+# of forces, stresses and lengths: powers of larger and of smaller ones are lost to floating point
+SMALLEST, LARGEST = 1e-100, 1e100
 # modules whose warnings are of bodies
 OF_BODIES = ("coupling.mortar", "bodies.rigid", "meshes.mesh_repair", "meshes.mesh_refinement")
 
@@ -47,6 +49,19 @@ def check_number(
             bounds.append(f"less than {high:g}")
         raise InputError(
             f"{name} must be a finite number {' and '.join(bounds)}".rstrip() + f"; got {value!r}."
+        )
+
+
+def check_size(name: str, value: float, low: float = -LARGEST) -> None:
+    """Raise InputError unless a value with a unit is a number in (low, LARGEST), and 0 or at least
+    SMALLEST.
+    """
+    check_number(name, value, low, LARGEST)
+    if 0 < abs(value) < SMALLEST:
+        zero = "write 0, or " if low < 0 else ""
+        raise InputError(
+            f"{name} is {value:g}, which is too small: {zero}take units in which it is larger than"
+            f" {SMALLEST:g}."
         )
 
 

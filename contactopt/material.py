@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from contactopt.checks import check_number
+from contactopt.checks import check_number, check_size
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Material:
     nu: float
 
     def __post_init__(self) -> None:
-        check_number("Young's modulus E", self.E, low=0.0)
+        check_size("Young's modulus E", self.E, low=0.0)
         check_number("Poisson's ratio nu", self.nu, low=-1.0, high=0.5)
 
 

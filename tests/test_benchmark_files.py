@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 import pytest
 
@@ -118,6 +119,22 @@ def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
+HELD = """
+thickness = 1
+[bodies.pad]
+block = { x = [0, 20], y = [0, 10], elements = [8, 4] }
+material = { E = 70e3, nu = 0.3 }
+contact = "y-"
+plates = [{ boundary = "y+", force = { y = -900 } }]
+[bodies.floor]
+rigid = {}
+[[contacts]]
+upper = "pad"
+lower = "floor"
+mu = 0.3
+"""
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -126,6 +143,11 @@ def test_meshes_that_no_machine_holds_are_one_sentence(tmp_path, capsys):
         (["pin-in-bush", "--force", "1e150"], "too large"),
         (["pin-in-bush", "--force", "1e-200"], "too small"),
         (["punch-2d", "--force", "1e-320"], "too small: write 0, or take units"),
+        (["held.toml", "--set", "bodies.pad.block.x.2=1e200"], "less than 1e+100"),
+        (["held.toml", "--set", "bodies.pad.block.x.2=1e-200"], "too small"),
+        (["held.toml", "--set", "bodies.pad.material.E=1e-300"], "too small: take units"),
+        (["held.toml", "--set", "thickness=1e-308"], "too small: take units"),
+        (["held.toml", "--set", "thickness=1e308"], "less than 1e+100"),
         (["hertz-half-space", "--force", "1e-300"], "too small: write 0, or take units"),
         (["punch-2d", "--out", "x" * 300], "File name too long"),
         (["x" * 300 + ".toml"], "does not exist"),
@@ -135,6 +157,8 @@ def test_sizes_that_numbers_lose_and_names_that_no_file_has(
     arguments, words, tmp_path, capsys, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
+    # as Windows editors write a file, with a mark before the first byte
+    Path("held.toml").write_text(HELD, encoding="utf-8-sig")
     assert main(["run", *arguments]) == 2
     one_line(capsys.readouterr().err, words)
 

@@ -8,7 +8,19 @@ import pytest
 import skfem
 from turned import mirror, turn
 
-from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce_bodies, run
+from contactopt import (
+    Contact,
+    Material,
+    Part,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    natural_map_residual,
+    reduce_bodies,
+    run,
+    solve,
+)
 from contactopt.coupling.patch_test import misfit
 from contactopt.coupling.posed import posed
 
@@ -160,6 +172,30 @@ def test_four_bodies_at_a_point_bear_a_uniform_stress(cells, kinds, laws, degree
 def test_eight_bodies_at_a_point_bear_a_uniform_stress(cells, degree, laws):
     scene, stress = quarters(cells, laws, 3, degree)
     uniform_and_independent(scene, stress)
+
+
+@pytest.mark.parametrize("dim, cells", [(2, (4,) * 4), (2, (4, 5, 6, 3)), (3, (2,) * 8)])
+def test_contacts_at_a_corner_that_exchange_forces_are_told(dim, cells):
+    """What they exchange is the kernel of their columns of Q: any small share is a solution, too.
+    Without friction, and where ties take part, the forces are unique.
+    """
+    scene, _ = quarters(cells, ("coulomb",) * dim, dim)
+    problem = reduce_bodies(scene).problem
+    solution = solve(problem)
+    alike = len({*cells}) == 1
+    told = [note for note in solution.notes if "the contact forces are not unique" in note]
+    assert len(told) == alike and all("1, 1)" in note for note in told)
+    if alike:
+        there = np.repeat(np.all(problem.coordinates.T == 1.0, axis=1), dim)
+        y = np.zeros(problem.q.size)
+        y[there] = np.linalg.svd(problem.Q[:, there])[2][-1]
+        share = 0.01 * solution.reactions.max() * y.reshape(problem.q.shape)
+        assert (
+            natural_map_residual(problem, solution.reactions + share, solution.multipliers) < 1e-9
+        )
+    for laws in (("frictionless",) * dim, ("coulomb", *("tied",) * (dim - 1))):
+        problem = reduce_bodies(quarters(cells, laws, dim)[0]).problem
+        assert not any("are not unique" in note for note in solve(problem).notes)
 
 
 def uniform_and_independent(scene, stress):

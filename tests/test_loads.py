@@ -155,6 +155,16 @@ def test_a_file_gives_a_pressure_and_its_path(tmp_path):
         block((Pressure("top", "much"),))
 
 
+def test_a_free_body_under_a_pressure_that_balances_itself_is_not_told_to_slide():
+    mesh = ring(IN, OUT, 3, 32).with_boundaries({"contact": lambda x: x[1] < 0})
+    own = Part("ring", mesh, STEEL, (), (Pressure("inside", P),), contact="contact")
+    low = MeshQuad.init_tensor(np.linspace(-30, 30, 21), np.linspace(-30, -OUT, 3))
+    box = low.with_boundaries({"up": lambda x: x[1] > -20.01, "low": lambda x: x[1] < -29.9})
+    lower = Part("box", box, STEEL, (Support("low"),), contact="up")
+    problem = contactopt.reduce(Scene("s", own, lower, 0.3))
+    assert not problem.s.any() and contactopt.solve(problem).solved
+
+
 def test_arrows_of_check_are_normal_to_the_boundary():
     mesh = ring(IN, OUT, 3, 24)
     x, n = _normals(mesh, mesh.boundaries["inside"])

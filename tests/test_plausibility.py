@@ -60,6 +60,18 @@ def said(scene):
     return notes
 
 
+def test_a_scene_in_which_nothing_pushes():
+    asked = "nothing pushes the bodies"
+    assert any(asked in note for note in said(pressed(load=("up", 0.0))))
+    for scene in (pressed(), pressed(upper=((0, 10), (-1e-4, 10)), load=("up", 0.0))):
+        assert not any(asked in note for note in said(scene))
+    moved = pressed(load=("up", 0.0))
+    sinking = replace(moved.bodies[1], supports=(Support("low", {"y": 1e-3}),))
+    assert not any(
+        asked in note for note in said(replace(moved, bodies=(moved.bodies[0], sinking)))
+    )
+
+
 WRONG = {
     "load on the contact": (dict(load=("low", -10.0)), "the traction on 'low' of body 'one'"),
     "E in Pa": (dict(materials=(Material(210e9, 0.3),) * 2), "stiffer than diamond"),

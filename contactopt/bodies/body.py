@@ -28,6 +28,7 @@ from contactopt.bodies.elements import (
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.bodies.thickness import thin_facets
+from contactopt.checks import check_size
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
@@ -125,6 +126,9 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
         raise InputError(
             f"body '{part.name}': the mesh has a node whose coordinates are not finite numbers."
         )
+    check_size(f"the largest coordinate of body '{part.name}'", float(np.abs(mesh.p).max()))
+    for length in np.ptp(mesh.p, axis=1):
+        check_size(f"the length of body '{part.name}'", float(length))
     if (middle := split_twice(mesh)) is not None:
         place = ", ".join(f"{x:g}" for x in middle)
         raise InputError(

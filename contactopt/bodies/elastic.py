@@ -32,6 +32,7 @@ from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import reload_body
 from contactopt.bodies.element_stress import added_work, fields_of, limits_of, recovery_errors
 from contactopt.bodies.fields import Fields, Region, Validity
+from contactopt.bodies.motions import work
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
@@ -386,8 +387,7 @@ def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
     resisted = body.plate_forces + old.extended.T @ (
         body.load + old.pull - old._stiffness @ body.prescribed
     )
-    resultants = np.concatenate(
-        [old.modes[0].T @ resisted, body.rigid_motions.fields.T @ body.load]
-    )
+    free = work(body.rigid_motions.fields, body.load)
+    resultants = np.concatenate([old.modes[0].T @ resisted, free])
     new = replace(old, body=body, resultants=resultants)
     return replace(new, at_rest=new._under(np.zeros(len(body.load))))

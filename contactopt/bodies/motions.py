@@ -37,6 +37,7 @@ from contactopt.scenes.kinds import Kind
 # holds it
 HELD = 1e-12
 PURE = 1e-9  # by how much a motion may miss the free ones and still count as one of them
+BALANCED = 1e-13  # share of the work of all forces below which their sum is rounding
 EXACT = 1e-9  # largest |A Z| over |A| |Z|: a free motion strains nothing
 
 
@@ -55,6 +56,14 @@ class Motions:
     names: tuple[str, ...]
     fixing: np.ndarray
     forces: np.ndarray
+
+
+def work(fields: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """The resultants (m,) of nodal forces (n,) in motions (n, m); zero, where they balance each
+    other, in place of what rounding leaves.
+    """
+    found = fields.T @ forces
+    return np.where(np.abs(found) > BALANCED * (np.abs(fields).T @ np.abs(forces)), found, 0.0)
 
 
 def rigid_fields(x: np.ndarray) -> np.ndarray:

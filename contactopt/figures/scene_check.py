@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
-from contactopt.bodies.motions import kernel, whole_motions
+from contactopt.bodies.motions import kernel, whole_motions, work
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import count
 from contactopt.checks import overheard
@@ -24,7 +24,7 @@ from contactopt.coupling.posed import Posed, posed, problem_of
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.unbalanced_loads import escape, loose_names, sentence, sorted_motions
+from contactopt.problem.unbalanced_loads import escape, resisted, sentence
 from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
@@ -132,7 +132,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
         at_rest=np.zeros(len(R)),
         motions=Z,
         motion_names=names,
-        resultants=Z.T @ body.load + (mean @ Z).T @ body.plate_forces,
+        resultants=work(Z, body.load) + (mean @ Z).T @ body.plate_forces,
     )
 
 
@@ -162,8 +162,7 @@ def _balance(states: Sequence[Scene], made: Posed, free: InterfaceProblem) -> li
             found.append(where + sentence(problem, gone))
     if found or not free.motions:
         return found[:1]
-    names = loose_names(free, sorted_motions(free)[1])
-    return [f"neither supports nor contacts resist a motion of {name}" for name in names]
+    return [said] if (said := resisted(free)[2]) else []
 
 
 def _posed_again(state: Scene, made: Posed) -> Posed:

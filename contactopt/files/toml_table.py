@@ -180,7 +180,7 @@ def read_table(path: Path, what: str = "scene file") -> Table:
             " bytes; meshes belong into files of their own."
         )
     try:
-        text = path.read_bytes().decode().replace("\r\n", "\n")
+        text = path.read_bytes().decode("utf-8-sig").replace("\r\n", "\n")
         data = parse(text)
         return Table(path.name, lines_of(text), data)
     except UnicodeDecodeError as error:

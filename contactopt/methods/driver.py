@@ -49,7 +49,6 @@ LEAST_PROOF = 0.3  # seconds for a proof past the time limit
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
 DOUBT, DEARER = 3, 0.25  # iterates before the proof is first looked for, and more per unknown
 SAME = 1e-11  # relative distance at which two iterates are the same state
-UNMOVED = "loads do not move it, and displacements are those without it"
 log = logging.getLogger(__name__)
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
 LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
@@ -180,7 +179,7 @@ def _run(
         problem = problem.explicit()
     held, basis, loose = resisted(problem)
     if loose:
-        note(log, f"neither supports nor contacts resist a motion of {loose}: {UNMOVED}")
+        note(log, loose)
     scaled, scales = dimensionless(isotropic(held))
     scales = replace(scales, stretch=problem.law.stretch(problem.dim), basis=basis)
     if swept is not None:

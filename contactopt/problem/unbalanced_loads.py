@@ -109,25 +109,28 @@ def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 
 
 def resisted(problem: InterfaceProblem) -> tuple[InterfaceProblem, np.ndarray | None, str]:
-    """The problem in the motions that contacts resist, their basis (p, m), and the names of the
+    """The problem in the motions that contacts resist, their basis (p, m), and a sentence about the
     others; the problem, None and '' where there are none, and where the loads push along one.
     """
     kept, loose = sorted_motions(problem)
     work = np.abs(loose.T @ problem.s) > SURE * (np.abs(loose.T) @ np.abs(problem.s))
     if not loose.shape[1] or work.any():
         return problem, None, ""
-    names = ", ".join(loose_names(problem, loose))
-    return problem.altered(V=problem.V @ kept, s=kept.T @ problem.s, motions=()), kept, names
+    said = (
+        f"neither supports nor contacts resist a motion of {_names(problem, loose)}: loads do not"
+        " move it, and displacements are those without it"
+    )
+    return problem.altered(V=problem.V @ kept, s=kept.T @ problem.s, motions=()), kept, said
 
 
-def loose_names(problem: InterfaceProblem, loose: np.ndarray) -> list[str]:
+def _names(problem: InterfaceProblem, loose: np.ndarray) -> str:
     """Names of the first motions that together determine the loose ones (p, f)."""
     names, left = [], loose.copy()
     for number, size in enumerate(np.linalg.norm(loose, axis=1)):
         if (rest := np.linalg.norm(left[number])) > SURE * size:
             names.append(_label(problem, number))
             left -= np.outer(left @ left[number], left[number]) / rest**2
-    return names
+    return ", ".join(names)
 
 
 def _label(problem: InterfaceProblem, number: int) -> str:

@@ -4,7 +4,7 @@ bodies that are misplaced, loads on a surface that may touch. `check` and `run` 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -28,7 +28,24 @@ def doubts(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
     meshed = [part for part in scene.meshed.values() if part.given]
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]
     found += [note for part in meshed for note in _faint_loads(scene, part)]
+    found += _unloaded(scene, couplings)
     return [*found, *_stiffness(scene), *_sizes(meshed), *_gaps(scene, couplings)]
+
+
+def _unloaded(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
+    """A scene in which nothing pushes."""
+    given: list[Any] = []
+    for part in scene.parts:
+        given += [load.values(scene.components) for load in getattr(part, "loads", ())]
+        given += [support.displacement for support in getattr(part, "supports", ())]
+        given += [getattr(part, name, None) for name in ("force", "displacement")]
+    values = [list(own.values()) if isinstance(own, Mapping) else own for own in given]
+    if any(np.any(own) for own in values) or any(np.any(own.gap < 0) for own in couplings):
+        return []
+    return [
+        "nothing pushes the bodies: there is no load, no displacement of a support and no overlap;"
+        " is a load missing?"
+    ]
 
 
 def said_of_meshes(scene: Scene) -> list[str]:

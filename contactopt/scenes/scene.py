@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.checks import check_number, short
+from contactopt.checks import check_number, check_size, short
 from contactopt.errors import InputError
 from contactopt.scenes.body_kinds import Body, HalfSpace, Part, Rigid, Support
 from contactopt.scenes.contact import Contact
@@ -97,7 +97,7 @@ class Scene:
                 raise self._wrong(
                     f"a body must be a Part, a Rigid or a HalfSpace; got {short(part)}."
                 )
-        check_number("the thickness", self.thickness, low=0.0)
+        check_size("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
         for name, count in (("elements", self.elements), ("copies", self.copies)):

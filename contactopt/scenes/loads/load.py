@@ -9,16 +9,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from contactopt.checks import check_number, short
+from contactopt.checks import check_size, short
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import KINDS
 
 if TYPE_CHECKING:
     from contactopt.files.toml_table import Table
     from contactopt.scenes.file_bodies import Reading
-
-# of forces, stresses and lengths: squares of larger and of smaller ones are lost to floating point
-LARGEST_VALUE, SMALLEST_VALUE = 1e100, 1e-150
 
 
 class Given(NamedTuple):
@@ -96,7 +93,7 @@ class Uniform(Load):
                 f" ({', '.join(components)}); got {short(value)}."
             )
         for one in value:
-            _check_value(f"every {what} value of body '{body}'", one)
+            check_size(f"every {what} value of body '{body}'", one)
 
     def density(self, x: np.ndarray, n: np.ndarray) -> np.ndarray:
         value = np.asarray(self.value, dtype=float)
@@ -126,13 +123,4 @@ def check_components(body: str, values: Mapping[str, float], kind: str) -> None:
                 f"body '{body}': there is no component {component!r}; use {', '.join(components)},"
                 f" which are those of kind {kind!r}{remedy}."
             )
-        _check_value(f"the {component} value of body '{body}'", value)
-
-
-def _check_value(what: str, value: float) -> None:
-    check_number(what, value, -LARGEST_VALUE, LARGEST_VALUE)
-    if 0 < abs(value) < SMALLEST_VALUE:
-        raise InputError(
-            f"{what} is {value:g}, which is too small: write 0, or take units in which it is larger"
-            f" than {SMALLEST_VALUE:g}."
-        )
+        check_size(f"the {component} value of body '{body}'", value)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from contactopt.checks import check_number
-from contactopt.scenes.loads.load import LARGEST_VALUE, Given, Load
+from contactopt.checks import check_size
+from contactopt.scenes.loads.load import Given, Load
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Pressure(Load):
 
     def check(self, body: str, kind: str) -> None:
         what = f"the pressure on {self.boundary!r} of body '{body}'"
-        check_number(what, self.pressure, -LARGEST_VALUE, LARGEST_VALUE)
+        check_size(what, self.pressure)
 
     @classmethod
     def read(cls, given: Given) -> Pressure:
