@@ -162,6 +162,13 @@ def check_name(what: str, name: object) -> None:
         raise InputError(f"{what} {short(name)} cannot name a file: {wrong}.")
 
 
+def place_words(x: Iterable[float]) -> str:
+    """Coordinates for a message, without brackets. What rounding leaves of zero is 0."""
+    place = np.asarray(list(x), dtype=float)
+    rounded = np.where(np.abs(place) <= 1e-9 * np.abs(place).max(), 0.0, place)
+    return ", ".join(f"{c:.6g}" for c in rounded)
+
+
 def short(value: object, most: int = 60) -> str:
     """Write a value as Python does. Of a text of more than `most` characters, three quarters of
     these stay, with three dots in the middle.

@@ -2,13 +2,17 @@
 empty name, and no sign of a zero.
 """
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import MATERIAL, block, two_blocks
 
+import contactopt
 from contactopt import InputError, Part, Plate, Scene, Support, run
+from contactopt.checks import place_words
 from contactopt.coupling.posed import posed
 from contactopt.figures import scene_check
 from contactopt.outcome import summary_rows
@@ -73,6 +77,19 @@ def test_zeros_have_no_sign():
         for own in table.values():
             for value in (*own["force"], *own["moment"]):
                 assert value != 0 or np.copysign(1, value) > 0
+
+
+def test_places_have_no_rounding_of_zero():
+    assert place_words(np.array([-16.24, 6.1e-16, -0.0])) == "-16.24, 0, 0"
+    assert place_words(np.zeros(2)) == "0, 0" and place_words([1e-9, 2e-9]) == "1e-09, 2e-09"
+    by_hand = re.compile(r"(near|at) \(\{[^}]*join")
+    near = re.compile(r"(?:near|at) \(\{(\w+)\}")
+    for file in Path(contactopt.__file__).parent.rglob("*.py"):
+        text = file.read_text()
+        assert not by_hand.search(text), file
+        for name in near.findall(text):
+            made = re.findall(rf"\b{name}(?:, \w+)? = (.*)", text)
+            assert not any("join" in one for one in made), (file, name)
 
 
 def test_the_approach_of_a_fit_around_a_body_has_no_number():

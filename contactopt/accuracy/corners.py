@@ -20,6 +20,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from contactopt.accuracy.estimate import Level
+from contactopt.checks import place_words
 from contactopt.readings.corners import at_re_entrant
 from contactopt.readings.peaks import Peak, Reading, at_rim
 from contactopt.readings.resultants import views
@@ -42,7 +43,7 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
         return ""
     values, pressure = _kept(levels), reading.peaks[0].body < 0
     rises = len(levels) > TRIED and len(values) > 1 and values[0] > RISE * values[-1]
-    place = "(" + ", ".join(f"{x:.4g}" for x in levels[-1].place) + ")"
+    place = "(" + place_words(levels[-1].place) + ")"
     what = f"the largest {'pressure' if pressure else 'stress'}"
     if pressure and grows(values, AT_EDGE) and _singular(solved, reading.peaks[0]):
         where = "is at the edge of the contact surface, a corner, where"

@@ -32,9 +32,10 @@ import skfem
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefQuad, RefTri
 
+from contactopt.checks import place_words
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, is_curved
-from contactopt.meshes.mesh_repair import SAME, text
+from contactopt.meshes.mesh_repair import SAME
 
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
 _TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
@@ -245,7 +246,7 @@ def unit(normals: np.ndarray) -> tuple[np.ndarray, int | None]:
 def opposed(place: np.ndarray) -> str:
     """The sentence for a place whose normals cancel."""
     return (
-        f"facets face opposite ways at ({text(place)}), so that the boundary has no"
+        f"facets face opposite ways at ({place_words(place)}), so that the boundary has no"
         " normal there; make a boundary of each side, with a contact of its own."
     )
 

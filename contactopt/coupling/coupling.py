@@ -22,6 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody
+from contactopt.checks import place_words
 from contactopt.coupling.patch_test import misfit
 from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
 from contactopt.errors import InputError
@@ -129,7 +130,7 @@ def tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, Assembled
     )
     if (found := misfit(made, surfaces)) is None:
         return made
-    where = ", ".join(f"{c:.4g}" for c in found.place)
+    where = place_words(found.place)
     said = (
         f"contact '{pair.name}', coupled by {made.kind}: a constant pressure gives body"
         f" '{bodies[found.side].name}' wrong forces, by {found.error:.2g} of a node's near"

@@ -44,6 +44,7 @@ import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody
+from contactopt.checks import place_words
 from contactopt.coupling.coupling import Coupling
 from contactopt.meshes.cells import joined
 from contactopt.scenes.contact import Contact
@@ -86,7 +87,7 @@ def _reduced(tie: _Seam, given: np.ndarray) -> Coupling:
     kept[given] = False
     if not tie.holds(kept):
         kept = tie.left
-        where = ", ".join(f"{x:.4g}" for x in tie.made.positions[:, given[0]])
+        where = place_words(tie.made.positions[:, given[0]])
         remarks += (
             f"the tie '{tie.pair.name}' has too few contacts to give one up where others join its"
             f" bodies too, near ({where}): the forces near its edge are not reliable; refine the"

@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from contactopt.bodies.assembled import AssembledBody
+from contactopt.checks import place_words
 from contactopt.errors import InputError
 from contactopt.scenes.contact import Contact
 
@@ -26,7 +27,7 @@ def check_once(pairs: Sequence[Contact], sides: Sequence[Sides]) -> None:
                 shared.append(_cells(body, name) & _cells(body, other))
         if all(shared):
             near = np.mean(min(shared[0]), axis=0)
-            where = ", ".join(f"{c:.4g}" for c in near)
+            where = place_words(near)
             raise InputError(
                 f"contacts '{first.name}' and '{second.name}' share facets of both bodies near"
                 f" ({where}), and each would carry a part of their force; keep each facet in one of"

@@ -77,6 +77,7 @@ from scipy.spatial import KDTree
 from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.elements import FACES, weight_at
+from contactopt.checks import place_words
 from contactopt.coupling.faces import Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
 from contactopt.coupling.mortar_matrices import collect, integrate, tidy
@@ -185,7 +186,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, nodes]
     x = np.where(fixed, x, (sums.own @ mine.points.T).T)
     if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
-        where = ", ".join(f"{c:.4g}" for c in sums.nearest)
+        where = place_words(sums.nearest)
         said = "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)"
         _log.warning(said, upper.name, lower.name, -sums.least, where)
     weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, nodes, normals)

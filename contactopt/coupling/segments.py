@@ -26,6 +26,7 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefTri
 
 from contactopt.bodies.elements import weight_at
+from contactopt.checks import place_words
 from contactopt.coupling.faces import Faces, cross, face_normals, patches
 from contactopt.coupling.facing import Facets, facing_pairs
 from contactopt.errors import InputError
@@ -165,7 +166,7 @@ def _nearest(
             where = mine.centre[:, np.argmax(mine.cell == np.argmax(covered))]
             raise InputError(
                 f"body '{other.name}': its contact boundary is folded, two layers of it face the"
-                f" same place near ({', '.join(f'{c:.4g}' for c in where)}); name only the part of"
+                f" same place near ({place_words(where)}); name only the part of"
                 " it that can touch."
             )
     return keep & (covered[cell] > SMALLEST), covered

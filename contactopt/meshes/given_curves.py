@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.checks import place_words
 from contactopt.errors import InputError
 
 OFF = 2e-2  # how far nodes may be from the curve of their boundary, over the size of the facets
@@ -48,7 +49,7 @@ class Curve:
             )
         lost = np.flatnonzero(~np.isfinite(found).all(axis=0))
         if len(lost):
-            place = ", ".join(f"{x:.6g}" for x in np.reshape(points, (len(points), -1))[:, lost[0]])
+            place = place_words(np.reshape(points, (len(points), -1))[:, lost[0]])
             raise InputError(f"{self.name} gives no numbers for the point ({place}).")
         return found
 
@@ -64,7 +65,7 @@ def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
     off = np.linalg.norm(moved - places, axis=0).max(axis=0)
     if len(size) and (np.mean(off > OFF * size) > FEW or np.any(off > FAR * size)):
         worst = int(np.argmax(off / size))
-        at = ", ".join(f"{x:.6g}" for x in places[:, :, worst].mean(axis=1))
+        at = place_words(places[:, :, worst].mean(axis=1))
         raise InputError(
             f"{curve.name} is not that of the mesh: near ({at}) it is {off[worst]:.3g} away from"
             f" the nodes, where a facet has the size {size[worst]:.3g}; mend its radius, its centre"

@@ -16,7 +16,7 @@ import numpy as np
 import skfem
 
 from contactopt.cards import count
-from contactopt.checks import check_number, overheard, remember
+from contactopt.checks import check_number, overheard, place_words, remember
 from contactopt.errors import InputError
 from contactopt.meshes.inp_elements import FACES
 from contactopt.meshes.mesh_formats import FileGroups, read_groups
@@ -29,7 +29,6 @@ from contactopt.meshes.mesh_repair import (
     complete,
     repaired,
     representatives,
-    text,
 )
 
 PLANE = 1e-9  # a mesh is plane if it is thinner than this fraction of its size
@@ -119,7 +118,7 @@ def _body(path: Path, groups: FileGroups, group: str | None, scale: float) -> sk
         "%s: %d elements (%s) of the body, %d nodes, from (%s) to (%s) in the unit of the scene;"
         " boundaries: %s; %d nodes of the file belong to none of its elements",
         path, mesh.nelements, cells.kind, np.count_nonzero(number >= 0),
-        text(mesh.p.min(axis=1)), text(mesh.p.max(axis=1)),
+        place_words(mesh.p.min(axis=1)), place_words(mesh.p.max(axis=1)),
         ", ".join(mesh.boundaries or {}) or "none", left_out,
     )  # fmt: skip
     return mesh
@@ -143,7 +142,7 @@ def name_boundaries(
         for axis, (low, high) in limits.items():
             inside &= np.all((corners[axis] >= low - near) & (corners[axis] <= high + near), axis=0)
         if not inside.any():
-            first, last = text(mesh.p.min(axis=1)), text(mesh.p.max(axis=1))
+            first, last = place_words(mesh.p.min(axis=1)), place_words(mesh.p.max(axis=1))
             raise InputError(
                 f"no facet of the surface lies at boundary {name!r}; the body reaches from"
                 f" ({first}) to ({last})."

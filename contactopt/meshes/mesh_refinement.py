@@ -18,6 +18,7 @@ import numpy as np
 import skfem
 from scipy.spatial import cKDTree
 
+from contactopt.checks import place_words
 from contactopt.errors import InputError
 from contactopt.meshes.cells import (
     CURVED,
@@ -70,7 +71,7 @@ def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     scale = max(np.abs(mesh.p).max(), np.ptp(mesh.p, axis=1).max())
     large = size > SMALLEST * scale
     if len(marked) and not large.any():
-        place = ", ".join(f"{x:.6g}" for x in corners[:, :, 0].mean(axis=1))
+        place = place_words(corners[:, :, 0].mean(axis=1))
         raise TooSmall(
             f"the elements near ({place}) cannot be divided"
             " further: they are as small as rounding allows."

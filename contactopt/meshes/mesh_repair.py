@@ -11,6 +11,7 @@ import numpy as np
 import skfem
 from scipy.spatial import KDTree
 
+from contactopt.checks import place_words
 from contactopt.errors import InputError
 from contactopt.meshes.cells import (
     area_vectors,
@@ -69,16 +70,12 @@ class Cells:
     def name(self, element: int) -> str:
         """What a message calls an element: its type, number and place."""
         middle = self.points[:, self.corners[:, element]].mean(axis=1)
-        return f"{self.kind} number {self.numbers[element] + 1} of the file, at ({text(middle)})"
+        number, place = self.numbers[element] + 1, place_words(middle)
+        return f"{self.kind} number {number} of the file, at ({place})"
 
     def refused(self, element: int, fault: str) -> InputError:
         """The error that names an element where `fault` has {}."""
         return InputError(f"mesh file '{self.path}': {fault.format(self.name(element))}")
-
-
-def text(x: np.ndarray) -> str:
-    """Coordinates for a message, with six digits each."""
-    return ", ".join(f"{value:.6g}" for value in x)
 
 
 def complete(cells: Cells) -> Cells:
@@ -136,9 +133,9 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     if len(unclear):
         i, j = pairs[unclear[0]]
         raise InputError(
-            f"mesh file '{cells.path}': nodes {i + 1} and {j + 1}, at ({text(cells.points[:, i])}),"
-            f" are {distance[unclear[0]]:.3g} apart, too far for one node and too near for two;"
-            " merge such nodes in the file."
+            f"mesh file '{cells.path}': nodes {i + 1} and {j + 1},"
+            f" at ({place_words(cells.points[:, i])}), are {distance[unclear[0]]:.3g} apart, too"
+            " far for one node and too near for two; merge such nodes in the file."
         )
     if not same.any():
         return own
@@ -147,7 +144,7 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
         log.warning(
             "%s: nodes that lie on others are merged with them,"
             " the first at (%s); %d pairs, at most %.3g apart",
-            cells.path, text(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max(),
+            cells.path, place_words(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max(),
         )  # fmt: skip
     label = joined(pairs.T, len(own))
     return np.asarray(np.unique(label, return_index=True)[1][label])

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.checks import place_words
 from contactopt.linear.operators import asymmetry, diagonal, form, has_entries, row_sizes
 from contactopt.problem.cones import polygon, simplex_steps, unit
 from contactopt.problem.interface_problem import InterfaceProblem
@@ -109,7 +110,7 @@ def held_apart(problem: InterfaceProblem) -> Infeasible | None:
     worst = int(np.argmax(apart))
     if not apart[worst] > APART * np.ptp(places, axis=1).max(initial=0.0):
         return None
-    where = ", ".join(f"{x:.4g}" for x in places[:, worst])
+    where = place_words(places[:, worst])
     sentence = (
         f"nodes that are tied are held on both sides, {apart[worst]:.3g} apart at ({where}), so"
         " there is no solution; free one side, or prescribe the same displacement on both."

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.bodies.fields import Region
+from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import straight
 from contactopt.meshes.curves import CORNER
@@ -44,7 +45,7 @@ def infinite(reduction: Reduction, solution: Solution, reading: Reading) -> str:
         return under_corner(reduction, solution, own[0]) if own else ""
     if not at_re_entrant(reduction, peak):
         return ""
-    place = ", ".join(f"{x:.4g}" for x in peak.place)
+    place = place_words(peak.place)
     return (
         f"the largest stress is at a re-entrant corner near ({place}): unless that is rounded, it"
         " is infinite, and grows with every refinement."
@@ -86,7 +87,7 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     total = sum(shares) * (2 if len(shares) == 1 else 1)
     if total <= 0.5 + CORNER / (2 * np.pi):
         return ""
-    place = ", ".join(f"{x:.4g}" for x in places[:, top])
+    place = place_words(places[:, top])
     return (
         f"the largest pressure of '{view.problem.pairs[0].name}' is under a corner near ({place}):"
         " unless that is rounded, it is infinite, and grows with every refinement."

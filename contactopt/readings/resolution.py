@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
@@ -44,7 +45,7 @@ def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
         if coupling.share is None or not np.any(rim := touches & (coupling.share < COVERED)):
             continue
         least = np.argmin(np.where(rim, coupling.share, 1.0))
-        where = ", ".join(f"{c:.4g}" for c in coupling.positions[:, least])
+        where = place_words(coupling.positions[:, least])
         found.append(
             f"{rim.sum()} contacts of '{view.problem.pairs[0].name}' touch at the rim of the other"
             " surface, which covers only a part of their faces, as little as"

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.checks import place_words
 from contactopt.errors import InputError
 
 LONGEST = 500  # characters
@@ -56,7 +57,7 @@ class Expression:
                 f" {', '.join(FUNCTIONS)}."
             ) from error
         if check and not np.all(np.isfinite(value)):
-            where = ", ".join(f"{x:.6g}" for x in points[:, int(np.argmin(np.isfinite(value)))])
+            where = place_words(points[:, int(np.argmin(np.isfinite(value)))])
             raise InputError(f"the expression {self.text!r} has no finite value at ({where}).")
         return value
 
