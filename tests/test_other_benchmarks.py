@@ -1,5 +1,6 @@
 """Where the field compares solvers: benchopt runs ours, qpbenchmark reads what we write."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -45,3 +46,17 @@ def test_qpbenchmark_reads_and_solves_what_is_written(tmp_path):
         size = max(1.0, np.abs(problem.q).max(), np.abs(found.x).max())
         assert found.found and found.primal_residual() < 1e-6 * size
         assert found.dual_residual() < 1e-6 * size
+
+
+def test_the_page_of_the_format_writes_a_problem_that_is_read_and_solved(tmp_path, monkeypatch):
+    """One contact on a plate, by hand: r_n = 3 balances the load, and r_t = -q_t / W_t sticks."""
+    pytest.importorskip("h5py")
+    page = (FOLDER.parent / "site" / "problem_format.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, re.S)
+    monkeypatch.chdir(tmp_path)
+    made: dict[str, object] = {}
+    for block in blocks:
+        exec(block, made)
+    answer = made["answer"]
+    np.testing.assert_allclose(answer.reactions, [[3.0, -0.5]], atol=1e-6)
+    np.testing.assert_allclose(answer.multipliers, [-6.0], atol=1e-6)
