@@ -146,7 +146,7 @@ class LeanBasis(skfem.CellBasis):
                 ) from error
         if np.any(bad):
             corners = self.mesh.p[:, self.mesh.t[:, np.argmax(bad)]]
-            place = ", ".join(f"{x:g}" for x in corners.mean(axis=1))
+            place = place_words(corners.mean(axis=1))
             raise InputError(
                 f"the mesh has an element without volume, or one that folds over, at ({place})."
             )
