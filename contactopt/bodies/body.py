@@ -28,7 +28,7 @@ from contactopt.bodies.elements import (
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.bodies.thickness import thin_facets
-from contactopt.checks import check_size
+from contactopt.checks import check_size, place_words
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
@@ -130,14 +130,14 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
     for length in np.ptp(mesh.p, axis=1):
         check_size(f"the length of body '{part.name}'", float(length))
     if (middle := split_twice(mesh)) is not None:
-        place = ", ".join(f"{x:g}" for x in middle)
+        place = place_words(middle)
         raise InputError(
             f"body '{part.name}': tetrahedra split a quadrilateral along different diagonals, at"
             f" ({place}), and share no side there; mesh this place anew."
         )
     _check_pieces(part, mesh)
     if (over := overlapping(mesh)) is not None:
-        place = ", ".join(f"{x:g}" for x in mesh.p[:, mesh.t[:, over]].mean(axis=1))
+        place = place_words(mesh.p[:, mesh.t[:, over]].mean(axis=1))
         raise InputError(
             f"body '{part.name}': an element of the mesh lies over its neighbour, at ({place});"
             " move its nodes apart, or mesh this place anew."
@@ -182,7 +182,7 @@ def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:
     nodes = [np.unique(mesh.t[:, piece == own]) for own in np.unique(piece)]
     shared = np.flatnonzero(np.bincount(np.concatenate(nodes)) > 1)
     if len(shared):
-        place = ", ".join(f"{x:g}" for x in mesh.p[:, shared[0]])
+        place = place_words(mesh.p[:, shared[0]])
         raise InputError(
             f"body '{part.name}': its mesh falls into {pieces} pieces that share nodes but no side"
             f" of an element, such as the node at ({place}), around which they turn as around a"

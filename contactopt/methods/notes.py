@@ -12,6 +12,7 @@ from contextvars import ContextVar
 
 import numpy as np
 
+from contactopt.checks import place_words
 from contactopt.linear.operators import form, has_entries
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.certificate import amplification
@@ -63,7 +64,7 @@ def remark(problem: InterfaceProblem, solution: Solution) -> None:
                 f" solution is nearly not unique{': see contactopt.diagnose' if asked else ''}.",
             )
     if solution.solved and (where := exchanging(problem, solution.reactions)) is not None:
-        place = ", ".join(f"{x:.4g}" for x in where)
+        place = place_words(where)
         note(
             logging.getLogger(__name__),
             f"at ({place}), where several surfaces meet, the contact forces are not unique: forces"
