@@ -11,8 +11,7 @@ from contactopt.benchmark.ranking import (
     points,
     ranking,
     reruns,
-    wall_over_cpu,
-    warning,
+    unranked,
 )
 from contactopt.benchmark.tables import select, told
 from contactopt.errors import InputError
@@ -23,9 +22,9 @@ PEERS = ("siconos", "pinocchio")
 
 def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     count = f"The table holds the runs on {table['problem'].nunique()} problems of the set."
-    busy = warning(wall_over_cpu(table))
+    why = unranked(table)
     found = told(table, leaders, repeats, others)
-    return [count, *found[:-1], *([busy] if busy else []), found[-1]]
+    return [count, *found[:-1], *([why] if why else []), found[-1]]
 
 
 def leaders(table) -> str:  # type: ignore[no-untyped-def]
@@ -34,11 +33,11 @@ def leaders(table) -> str:  # type: ignore[no-untyped-def]
     if "auto" not in leaders.index or not leaders.loc["auto", "of"] > 0:
         return "No solver reached the certificate 1e-6 on a problem that all of them take."
     auto = leaders.loc["auto"]
+    least = f"{auto['over the least']:.2g}"
     return (
         f"`auto` reaches the certificate 1e-6 on {int(auto['solved'])} of the {int(auto['of'])}"
-        f" problems that all {len(leaders)} solvers take and some solver solves. Its mean CPU time"
-        f" over them is {auto['over the least']:.2g} times the least of them."
-    )
+        f" problems that all {len(leaders)} solvers take and some solver solves."
+    ) + ("" if unranked(table) else f" Its mean CPU time over them is {least} times the least.")
 
 
 def repeats(table) -> str:  # type: ignore[no-untyped-def]
