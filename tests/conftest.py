@@ -1,11 +1,13 @@
 """Small problems that several test files share."""
 
+import os
 import re
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 from skfem import MeshQuad
+from threadpoolctl import threadpool_limits
 
 from contactopt import InterfaceProblem, Material, Part, Plate, Scene, Support, reduce, scenes
 from contactopt.meshes.structured import rename, tensor_mesh
@@ -14,6 +16,15 @@ from tests.without import optional_packages
 MATERIAL = Material(5.0, 0.3)
 EXTRAS = optional_packages()
 OPTIONAL = {name for group in EXTRAS.values() for name in group}
+
+
+def pytest_configure():
+    """Workers share the processors: each, and what it starts, has one thread for linear algebra,
+    unless the user says otherwise.
+    """
+    if "PYTEST_XDIST_WORKER" in os.environ and "OMP_NUM_THREADS" not in os.environ:
+        os.environ["OMP_NUM_THREADS"] = "1"
+        threadpool_limits(1)
 
 
 def _missing(error: BaseException) -> str | None:
