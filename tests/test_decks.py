@@ -577,4 +577,5 @@ def test_what_stiffens_no_body_is_told_in_every_run_with_the_mesh(tmp_path, name
     )
     kind = {2: "plane-strain", 3: "solid"}[len(mesh.p)]
     remarks = run(Scene("one", part, Rigid("floor"), 0.0, kind=kind)).summary["remarks"]
-    assert [text.startswith(f"{tmp_path}/{told}") for text in remarks] == [True] * bool(told)
+    of_the_file = [text for text in remarks if str(tmp_path) in text]
+    assert [text.startswith(f"{tmp_path}/{told}") for text in of_the_file] == [True] * bool(told)

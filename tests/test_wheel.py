@@ -126,6 +126,12 @@ Path("few.toml").write_text('name = "few"\\ntitle = "few"\\n' + text)
 assert main(["bench", "few.toml", "--out", "out"]) == 0
 assert main(["report", "out"]) == 0
 """,
+    "cluster": """
+from distributed import Client
+from contactopt.benchmark import cluster
+with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
+    assert client.submit(abs, -1).result() == 1
+""",
     "mesh": """
 import gmsh
 gmsh.initialize()

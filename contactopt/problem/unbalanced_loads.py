@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from contactopt.errors import Unbalanced
 from contactopt.problem.cones import polygon, simplex_steps
 from contactopt.problem.interface_problem import InterfaceProblem
-from contactopt.problem.scaling import isotropic
+from contactopt.problem.scaling import isotropic, without_rounding
 
 # work of the largest load over a motion's displacements from which on the motion counts
 SURE = 1e-6
@@ -104,7 +104,7 @@ def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
     sizes = np.where(sizes > 0, sizes, 1.0)
     moved = np.vstack([(problem.V / sizes)[resists.ravel()], np.zeros((count, count))])
     _, stretches, axes = np.linalg.svd(np.linalg.qr(moved, mode="r"))
-    held, basis = stretches >= LOOSE, axes.T / sizes[:, None]
+    held, basis = stretches >= LOOSE, without_rounding(axes.T) / sizes[:, None]
     return basis[:, held], basis[:, ~held]
 
 
