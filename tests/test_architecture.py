@@ -31,8 +31,8 @@ def test_few_ask_for_the_type_of_q():
 
 
 def test_newton_steps_are_added_in_one_place():
-    """A step is taken in kernels/loop.py; other files evaluate equations, or solve for a step."""
+    """A step is taken in newton_loop.py; other files evaluate equations, or solve for a step."""
     taken = re.compile(r"system\.change\(")
     kernels = ROOT / "contactopt" / "methods"
     files = {path.name for path in kernels.rglob("*.py") if taken.search(path.read_text())}
-    assert files == {"loop.py"}
+    assert files == {"newton_loop.py"}

@@ -38,6 +38,12 @@ def test_stragglers_are_solved_by_the_default(monkeypatch):
     assert {solution.method == batch.NAME for solution in found} == {True, False}
 
 
+def test_the_steps_of_each_problem_are_counted():
+    q = np.array([[[1.0, 0.0]], [[-1.0, 0.3]]])  # open, and sticking
+    apart, touching = solve_batch(np.stack([np.eye(2)] * 2), q, 0.5)
+    assert apart.iterations == 0 < touching.iterations <= batch.STEPS
+
+
 def test_a_singular_problem_leaves_the_others_alone():
     M = np.stack([np.eye(2), np.zeros((2, 2)), 2 * np.eye(2)])
     x = batch._solved(M, np.ones((3, 2, 1)))[:, :, 0]

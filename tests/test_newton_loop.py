@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from contactopt.methods.kernels.loop import newton_iterates
+from contactopt.methods.kernels.newton_loop import newton_iterates
 
 
 class Root:

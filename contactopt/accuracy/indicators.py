@@ -141,8 +141,10 @@ def _of_shape(
     """What volumes (elements,) between facets and their curves add to the error."""
     if not np.any(volume):
         return np.zeros(len(volume))
-    forces = [np.asarray(own.value) for own in part.loads if not own.boundary]
-    load = np.sum([np.zeros(dim), *forces], axis=0)
+    load, origin = np.zeros(dim), np.zeros((dim, 1))
+    for own in part.loads:
+        if not own.boundary:
+            load += own.density(origin, origin)[:, 0]
     (work,) = body.added_work(volume, load, U, W)
     (energy,) = body.added_work(volume, 0 * load, U, U)
     return np.asarray(work - curved * energy)

@@ -95,12 +95,14 @@ def _versions() -> str:
 
 @cache
 def _machine() -> str:
+    import psutil
+
     model = platform.processor() or platform.machine()
     if os.path.exists("/proc/cpuinfo"):
         with open("/proc/cpuinfo") as file:
             names = [line.split(":")[1].strip() for line in file if line.startswith("model name")]
         model = names[0] if names else model
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
+    memory = psutil.virtual_memory().total / 1e9
     return f"{model}, {os.cpu_count()} cores, {memory:.0f} GB, {platform.system()}"
 
 

@@ -199,8 +199,8 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
-    """The leader table of a report at a certificate; without ranks where the machine was busy, or
-    where machines cannot be compared.
+    """The leader table of a report at a certificate; in the order of names and without a comparison
+    where the machine was busy, or where machines cannot be compared.
     """
     found = ranking(points(table), accuracy)
     shown = {
@@ -208,14 +208,15 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
         "solved": [f"{n} of {all_}" for n, all_ in zip(found["solved"], found["of"])],
         "takes": [f"{n} of {all_}" for n, all_ in zip(found["taken"], found["problems"])],
         "CPU [s]": found["mean"],
-        "over the least": found["over the least"],
         "wall [s]": found["wall mean"],
         "memory [MB]": found["memory"],
         "certificate / asked": found["over claim"],
     }
-    if not unranked(table):
-        bounds = zip(found["rank"], found["best"], found["worst"])
-        shown = {"rank (95 %)": [f"{n} ({low} to {high})" for n, low, high in bounds]} | shown
+    if unranked(table):
+        return found.assign(**shown)[list(shown)].sort_values("method", ignore_index=True)
+    bounds = zip(found["rank"], found["best"], found["worst"])
+    rank = {"rank (95 %)": [f"{n} ({low} to {high})" for n, low, high in bounds]}
+    shown = rank | shown | {"over the least": found["over the least"]}
     return found.assign(**shown)[list(shown)]
 
 

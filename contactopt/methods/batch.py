@@ -73,29 +73,30 @@ def solve_all(problems: list[InterfaceProblem], tol: float) -> list[Solution]:
     """The solutions of problems of one size as `problems_of` makes them."""
     if not problems or not problems[0].contacts:
         return [solve(problem, tol=tol) for problem in problems]
-    forces = _newton(
+    forces, counts = _newton(
         np.stack([problem.Q for problem in problems]),
         np.stack([problem.q for problem in problems]),
         np.stack([problem.mu for problem in problems]),
     )
     none, found = np.zeros(0), list[Solution]()
-    for problem, r in zip(problems, forces):
+    for problem, r, steps in zip(problems, forces, counts):
         residual = natural_map_residual(problem, r, none)
         if residual <= tol:
-            found.append(Solution(r, none, Status.SOLVED, residual, 1, NAME))
+            found.append(Solution(r, none, Status.SOLVED, residual, int(steps), NAME))
         else:
             found.append(solve(problem, tol=tol))
     return found
 
 
 @np.errstate(all="ignore")  # what overflows is no solution, and is left to the default method
-def _newton(Q: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """Forces (b, k, dim) that Newton's steps from no force reach."""
+def _newton(Q: np.ndarray, q: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (b, k, dim) that Newton's steps from no force reach, and how many steps (b,)."""
     (b, k, dim), n = q.shape, Q.shape[1]
     compliance = Q.diagonal(0, 1, 2).reshape(b, k, dim).mean(axis=2)
     least = RIDGE * np.maximum(compliance.mean(axis=1), np.finfo(float).tiny)
     rho = 1 / np.maximum(compliance, least[:, None])
     r, left, one = np.zeros(q.shape), np.arange(b), np.eye(dim)
+    counts = np.zeros(b, dtype=int)
     own = np.arange(k)
     for _ in range(STEPS):
         at = r[left]
@@ -115,7 +116,8 @@ def _newton(Q: np.ndarray, q: np.ndarray, mu: np.ndarray) -> np.ndarray:
         M[:, own, :, own, :] += (one - D + least[left, None, None, None] * scaled).swapaxes(0, 1)
         step = _solved(M.reshape(-1, n, n), error.reshape(-1, n, 1))
         r[left] = at + step.reshape(at.shape)
-    return r
+        counts[left] += 1
+    return r, counts
 
 
 def _solved(M: np.ndarray, right: np.ndarray) -> np.ndarray:

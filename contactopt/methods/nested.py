@@ -26,7 +26,7 @@ from contactopt.linear.operators import form
 from contactopt.methods import constants, find_method
 from contactopt.methods.kernels.level_steps import GridSteps
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
-from contactopt.methods.kernels.loop import newton_iterates
+from contactopt.methods.kernels.newton_loop import newton_iterates
 from contactopt.methods.method import Iterate, Method
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem

@@ -34,7 +34,7 @@ from contactopt.methods.kernels.alart_curnier import (
 from contactopt.methods.kernels.balance import settled
 from contactopt.methods.kernels.coupled_newton import CoupledSteps
 from contactopt.methods.kernels.krylov import Krylov, model_of
-from contactopt.methods.kernels.loop import Forcing, Unknowns, newton_iterates
+from contactopt.methods.kernels.newton_loop import Forcing, Unknowns, newton_iterates
 from contactopt.methods.kernels.semismooth import Evaluated, Solve, evaluated
 from contactopt.methods.method import Iterate, Known, Method
 from contactopt.methods.notes import note

@@ -40,7 +40,7 @@ from contactopt.methods.kernels.alart_curnier import (
 from contactopt.methods.kernels.balance import settled
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.kernels.linearised import Linearised
-from contactopt.methods.kernels.loop import Forcing, Unknowns
+from contactopt.methods.kernels.newton_loop import Forcing, Unknowns
 from contactopt.methods.kernels.semismooth import Equations
 from contactopt.methods.method import Iterate, Known
 from contactopt.methods.preconditioners import Preconditioner

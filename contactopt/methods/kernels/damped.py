@@ -7,7 +7,7 @@ from itertools import islice
 import numpy as np
 
 from contactopt.methods import constants
-from contactopt.methods.kernels.loop import newton_iterates
+from contactopt.methods.kernels.newton_loop import newton_iterates
 from contactopt.methods.kernels.semismooth import Equations, Factored, Steps
 from contactopt.methods.kernels.sparse_blocks import Blocks
 from contactopt.methods.method import Iterate

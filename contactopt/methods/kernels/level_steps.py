@@ -21,7 +21,7 @@ from contactopt.methods.constants import FIRST_SHIFT, SHIFT_RATIO
 from contactopt.methods.kernels.elimination import eliminated
 from contactopt.methods.kernels.levels import Evaluation, Level, Point
 from contactopt.methods.kernels.linearised import Border
-from contactopt.methods.kernels.loop import Forcing, Unknowns
+from contactopt.methods.kernels.newton_loop import Forcing, Unknowns
 
 logger = logging.getLogger(__name__)
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from contactopt.errors import BackendError
 from contactopt.linear.operators import Interface
-from contactopt.methods.kernels.loop import Unknowns, newton_iterates
+from contactopt.methods.kernels.newton_loop import Unknowns, newton_iterates
 from contactopt.methods.kernels.sparse_blocks import Blocks, block_matrix
 from contactopt.methods.method import Iterate
 from contactopt.methods.notes import note

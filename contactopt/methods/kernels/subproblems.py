@@ -13,7 +13,7 @@ from contactopt.errors import BackendError
 from contactopt.linear.operators import diagonal
 from contactopt.methods import constants
 from contactopt.methods.kernels.krylov import Krylov
-from contactopt.methods.kernels.loop import newton_iterates
+from contactopt.methods.kernels.newton_loop import newton_iterates
 from contactopt.methods.kernels.semismooth import Equations, Evaluated, Projection, Steps
 from contactopt.methods.method import Iterate
 from contactopt.methods.preconditioners import Preconditioner
