@@ -24,6 +24,6 @@ class ContactStatus:
 
 
 def contact_status(problem: InterfaceProblem, reactions: np.ndarray) -> ContactStatus:
-    """Which contacts are open, stick or slip: three masks (k,), one of them True at each contact."""
+    """Which contacts are open, stick or slip: three masks (k,), of which one is True each."""
     touching, stick = problem.law.pressed(reactions), problem.law.sticking(reactions)
     return ContactStatus(~touching, stick, touching & ~stick)

@@ -32,7 +32,7 @@ THERE = 0.05  # of the distance of contacts, within which a node is at the place
 
 
 def infinite(reduction: Reduction, solution: Solution, reading: Reading) -> str:
-    """One sentence if the largest value of a reading lies where it is infinite, or an empty text."""
+    """One sentence if the largest value of a reading is where it is infinite, else nothing."""
     if not reading.peaks or not solution.solved:
         return ""
     peak = reading.peaks[0]
