@@ -148,7 +148,7 @@ def _of_shape(
 
 def read_once(solved: Solved, name: str) -> dict[str, Any]:
     """Read a quantity from one solution: its "value", its relative "error", None where one mesh
-    says nothing, and a "message" where it is infinite or missing. Of a load path it is the last
+    says nothing, and a "message" where it is infinite or missing. A load path counts by its last
     state.
     """
     quantity = find_quantity(name, solved.reduction.scene)
