@@ -13,7 +13,12 @@ from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import Mortar, contact_normals, mortar
-from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
+from contactopt.coupling.planes_of_symmetry import (
+    NEAR,
+    ContactPoints,
+    smooth_across,
+    symmetry_planes,
+)
 from contactopt.errors import InputError
 from contactopt.meshes.curves import KINK
 from contactopt.scenes.contact import SIDES, Contact
@@ -47,7 +52,9 @@ def couple_surfaces(
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
     # as well where a plane of symmetry of both cuts it.
-    own_held = mine.held[:, m.nodes]
+    # Along its normal a contact passes its force on to all nodes around, so that a constant pressure
+    # stays one.
+    own_held = mine.held[:, m.nodes] & (np.abs(m.normals) <= NEAR)
     other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
     if carrier.mirror is not None:
         other_held |= carrier.mirror[:, m.nodes]
@@ -137,7 +144,10 @@ def _faces(name: str, m: Mesh) -> Faces:
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
     """Both surfaces with the nodes that lie in a plane of symmetry of both."""
-    planes = [symmetry_planes(_vertices(side, mesh)) for side, mesh in zip(sides, meshes)]
+    planes = []
+    for contacts in map(_vertices, sides, meshes):
+        found = symmetry_planes(contacts)
+        planes.append([plane for plane in found if smooth_across(contacts, plane)])
     size = max(float(np.ptp(side.points[:, np.unique(side.faces)], axis=1).max()) for side in sides)
     common = [
         plane

@@ -11,6 +11,9 @@ from contactopt.bodies.assembled import Guides
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 
+# A polygon in a circle leaves its plane of symmetry with half of the slope of its second vertex, or
+# .8 of it where the second facet has a quarter of the length of the first; a plane with all of it.
+EDGE = 0.85
 NEAR = 1e-9  # what counts as zero beside the size of a surface or of all bodies, or beside one
 
 
@@ -69,10 +72,27 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
     return planes
 
 
+def smooth_across(contacts: ContactPoints, plane: SymmetryPlane) -> bool:
+    """Whether a surface crosses the plane at a right angle, but for the slope of its facets. Else it
+    has an edge there, such as a slanted plane, and keeps its own normals.
+    """
+    within = plane.contains(contacts.points, contacts.size)
+    around = np.unique(contacts.cells[:, within[contacts.cells].any(axis=0)])
+    slope = np.abs(plane.inward @ contacts.normals)
+    beside = around[~within[around]]
+    return bool(
+        not beside.size
+        or slope[within].max(initial=0.0) <= NEAR
+        or slope[within].mean() <= EDGE * slope[beside].mean()
+    )
+
+
 def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
     """Unit normals (dim, k) that lie in the planes at their contacts, as with mirror images."""
     normals = contacts.normals
     for plane in symmetry_planes(contacts):
+        if not smooth_across(contacts, plane):
+            continue
         out = plane.inward @ normals
         straight = normals - plane.inward[:, None] * out
         straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
