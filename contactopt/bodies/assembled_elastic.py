@@ -86,6 +86,12 @@ class AssembledElastic(AssembledBody):
             places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
+        k = len(trace.nodes)
+        own = sp.csr_matrix((np.ones(k), (np.arange(k), trace.nodes)), trace.weights.shape)
+        traces, alone = (
+            tuple(_trace(weights, row, len(held)) for row in unknowns)
+            for weights in (trace.weights, own)
+        )
         return Surface(
             body.name,
             body.locations[:, trace.nodes],
@@ -93,9 +99,10 @@ class AssembledElastic(AssembledBody):
             trace.areas,
             trace.weights[:, nodes],
             places,
-            tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
+            traces,
             held[unknowns[:, trace.nodes]],
             trace.cells,
+            alone if body.degree > 1 else None,
             self._mesh(name, held, curve),
         )
 
@@ -136,18 +143,12 @@ class AssembledElastic(AssembledBody):
         return condense(self.body, solver, entries)
 
 
-def _trace(
-    weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
-) -> sp.csr_matrix:
-    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,), by
-    their rows of the weights. Where it is prescribed at the contact node, it is that of the node
-    alone: the weights of a neighbour and of its mirror image cancel each other there.
+def _trace(weights: sp.csr_matrix, unknowns: np.ndarray, n: int) -> sp.csr_matrix:
+    """One component of the displacement of the contacts (k,) in terms of all n unknowns of a body,
+    by their rows of the weights of its nodes, which have the unknowns given.
     """
-    k = len(nodes)
-    alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
-    prescribed = sp.diags(held[unknowns[nodes]].astype(float))
-    part = sp.coo_matrix(weights - prescribed @ (weights - alone))
-    trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (k, len(held)))
+    part = sp.coo_matrix(weights)
+    trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (len(weights.indptr) - 1, n))
     trace.eliminate_zeros()
     return trace
 

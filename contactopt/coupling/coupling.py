@@ -25,7 +25,12 @@ import scipy.sparse as sp
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.checks import place_words
 from contactopt.coupling.patch_test import misfit
-from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
+from contactopt.coupling.planes_of_symmetry import (
+    NEAR,
+    ContactPoints,
+    SymmetryPlane,
+    symmetry_planes,
+)
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law, Place, make_law
@@ -215,3 +220,21 @@ def local_map(
         T = T + along @ trace[contacts]
     T.eliminate_zeros()
     return sp.csr_matrix(T)
+
+
+def guided(T: sp.csr_matrix, frames: np.ndarray, held: np.ndarray) -> sp.csr_matrix:
+    """A map T (k dim, n) to contacts (k,) without the tangential motion that supports rule out.
+
+    Where both bodies are held along an axis e, held (dim, k), that leans on the contact's normal n,
+    no friction acts along the tangential part of e: there u_t is a multiple of u_n, and friction
+    along it would be what the support gives. So the pressure alone carries the normal force.
+    """
+    leaning = held.T & (np.abs(frames[:, 0]) > NEAR)
+    if not leaning.any():
+        return T
+    keep = np.broadcast_to(np.eye(frames.shape[1]), frames.shape).copy()
+    for i in np.flatnonzero(leaning.any(axis=1)):
+        across = frames[i, 1:][:, leaning[i]]
+        keep[i, 1:, 1:] -= across @ np.linalg.pinv(across, rcond=NEAR)
+    k = np.arange(len(keep) + 1)
+    return sp.csr_matrix(sp.bsr_matrix((keep, k[:-1], k)) @ T)

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody, Mesh, Surface
 from contactopt.coupling.charts import lay_out
-from contactopt.coupling.coupling import Coupling, local_map, of_contacts
+from contactopt.coupling.coupling import Coupling, guided, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import Mortar, contact_normals, mortar
 from contactopt.coupling.planes_of_symmetry import (
@@ -52,9 +52,7 @@ def couple_surfaces(
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
     # as well where a plane of symmetry of both cuts it.
-    # Along its normal a contact passes its force on to all nodes around, so that a constant pressure
-    # stays one.
-    own_held = mine.held[:, m.nodes] & (np.abs(m.normals) <= NEAR)
+    own_held = mine.held[:, m.nodes]
     other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
     if carrier.mirror is not None:
         other_held |= carrier.mirror[:, m.nodes]
@@ -65,13 +63,15 @@ def couple_surfaces(
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
     laid_out = lay_out(contacts, scene.copies, scene.analysis.revolved)
     _, frames, order = laid_out
+    # along its normal a contact passes its force on to all nodes around
+    single = own_held & (np.abs(m.normals) <= NEAR)
     maps = []
     for i, mesh in enumerate(meshes):
         traces = [
             sp.csr_matrix(sum(part @ picked for part, picked in zip(row, mesh.picked)))
-            for row in m.components(i, own_held)
+            for row in m.components(i, single)
         ]
-        maps.append(local_map(traces, order, frames))
+        maps.append(guided(local_map(traces, order, frames), frames, contacts.held[:, order]))
     side = SIDES[m.own]
     said = "contact '%s': mortar, %d contacts on the %s body '%s'"
     log.info(said, pair.name, len(order), side, carrier.name)

@@ -73,8 +73,8 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
 
 
 def smooth_across(contacts: ContactPoints, plane: SymmetryPlane) -> bool:
-    """Whether a surface crosses the plane at a right angle, but for the slope of its facets. Else it
-    has an edge there, such as a slanted plane, and keeps its own normals.
+    """Whether a surface crosses the plane at a right angle, but for the slope of its facets. Else
+    it has an edge there, such as a slanted plane, and keeps its own normals.
     """
     within = plane.contains(contacts.points, contacts.size)
     around = np.unique(contacts.cells[:, within[contacts.cells].any(axis=0)])
