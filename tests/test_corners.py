@@ -9,7 +9,19 @@ import skfem
 from mortar_scenes import ring
 from turned import mirror, moved, turn
 
-from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce, run, solve
+from contactopt import (
+    Contact,
+    Material,
+    Part,
+    Pressure,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    reduce,
+    run,
+    solve,
+)
 from contactopt.bodies.corners import copies
 from contactopt.bodies.elements import make_basis
 from contactopt.errors import InputError
@@ -94,6 +106,50 @@ def test_a_block_in_a_seat_bears_its_uniform_stress(cells, kinds, names, degree)
     assert np.allclose(result.pressure, np.where(normal > 0.5, 0.6, 1.0), rtol=1e-8)
     assert np.isclose(result.problem.areas.sum(), 2.0)
     assert not any("constant pressure" in text for text in result.summary["remarks"])
+
+
+@pytest.mark.parametrize(("law", "mu"), [("coulomb", 0.3), ("coulomb", 1.2), ("bilateral", 0.3)])
+@pytest.mark.parametrize(("degree", "kind"), [(1, "quad"), (1, "tri"), (2, "quad"), (2, "tri")])
+def test_a_corner_under_constant_pressure_has_no_friction(degree, kind, law, mu):
+    scene = seated((2, 2), (kind, kind), 2, degree, (Contact("block", "seat", mu, law=law),))
+    loads = [tuple(Traction(f"high{i}", tuple(-np.eye(2)[i])) for i in range(2))] * 2
+    bodies = (replace(part, loads=own) for part, own in zip(scene.bodies, loads))
+    result = run(replace(scene, bodies=tuple(bodies)), figures=())
+    assert np.abs(result.pressure - 1).max() < 1e-6
+    assert np.abs(result.solution.reactions[:, 1]).max() < 1e-6
+
+
+def slanted(rise: float, cells: tuple[int, int], kind: str, degree: int, law: str) -> Scene:
+    """Two blocks under the pressure 1 all around; their seam climbs from a frictionless wall."""
+    floor, parts = {"left": Support("left", {"x": 0.0}), "low": Support("low", {"y": 0.0})}, []
+    for name, n in zip(("lower", "upper"), cells):
+        mesh = KINDS[kind, 2].init_tensor(np.linspace(0, 3, 2 * n + 1), np.linspace(0, 1, n + 1))
+        sides = {"low": mesh.p[1] == 0, "high": mesh.p[1] == 1, "left": mesh.p[0] == 0}
+        sides["right"] = mesh.p[0] == 3
+        facets = {side: np.flatnonzero(on[mesh.facets].all(axis=0)) for side, on in sides.items()}
+        x, y = mesh.p
+        seam = 1 + (rise - 1) * x / 3
+        p = np.stack([x, y * seam if name == "lower" else seam + y * (2.5 - seam)])
+        mesh = type(mesh)(p, mesh.t, _boundaries=facets)
+        held = tuple(floor.values()) if name == "lower" else (floor["left"],)
+        pressed = ("right",) if name == "lower" else ("right", "high")
+        loads = tuple(Pressure(side, 1.0) for side in pressed)
+        contact = "high" if name == "lower" else "low"
+        parts.append(Part(name, mesh, Material(E, NU), held, loads, contact=contact))
+    pair = Contact("upper", "lower", 0.3, law=law)
+    return Scene("slanted", bodies=tuple(parts), contacts=(pair,), degree=degree)
+
+
+@pytest.mark.parametrize("law", ["frictionless", "coulomb", "tied"])
+@pytest.mark.parametrize(
+    ("cells", "kind", "degree"),
+    [((2, 2), "quad", 1), ((2, 2), "quad", 2), ((2, 2), "tri", 2), ((2, 3), "tri", 2)],
+)
+def test_a_slanted_plane_keeps_its_normal_at_a_wall(cells, kind, degree, law):
+    result = run(slanted(1.3, cells, kind, degree, law), figures=())
+    assert np.abs(result.pressure - 1).max() < 1e-8
+    for body in result.fields:
+        assert np.abs(body.stress - [-1, -1, -2 * NU, 0]).max() < 1e-8
 
 
 @pytest.mark.parametrize(

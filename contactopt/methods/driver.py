@@ -24,6 +24,7 @@ from contactopt.linear.operators import (
 from contactopt.linear.stacked import Stacked
 from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
 from contactopt.methods.auto import Auto
+from contactopt.methods.exchanged import least_friction
 from contactopt.methods.method import Iterate, Known, Method, at_rest, dimensionless_start
 from contactopt.methods.notes import collected, note, remark
 from contactopt.methods.small import solve_small
@@ -114,6 +115,7 @@ def solve(
             solution, swept = solve_small(problem, tol)
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
+        solution = least_friction(problem, solution, tol)
         remark(problem, solution)
     return replace(solution, notes=tuple(notes)) if notes else solution
 

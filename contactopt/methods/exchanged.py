@@ -1,0 +1,118 @@
+"""Forces that contacts around one place can exchange: at a corner of 90 degrees four components of
+two forces move one node in two directions.
+
+Such forces y, with Q y = 0 and V' y = 0, change neither displacements nor balance. Of all forces
+that hold there, those with the least friction are given: a corner under constant pressure has this
+pressure, and no friction.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from contactopt.checks import place_words
+from contactopt.linear.operators import form, has_entries
+from contactopt.methods.notes import note
+from contactopt.problem import InterfaceProblem, Solution, natural_map_residual
+from contactopt.problem.scaling import immovable
+
+# Contacts around a place that exchange forces, too: on quadratic elements an exchange falls to a
+# thousandth within three elements.
+NEAREST = 40
+TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
+# share of the normal force, and of its friction, that a force may lose and still hold
+INSIDE = 1e-6
+UNFELT = 1e-10  # relative size of displacements by forces that no body feels
+
+
+def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) -> Solution:
+    """The solution with the least friction at every place where contacts can exchange forces, its
+    certificate at most `tol`, and a note of a place where this leaves some, or several solutions.
+    """
+    if not solution.solved:
+        return solution
+    points = problem.coordinates.T
+    for at in places(problem):
+        left = False
+        far = np.linalg.norm(points - points[at[0]], axis=1)
+        near = np.argsort(far, kind="stable")[:NEAREST]
+        for contacts in _closed(problem, solution.reactions, near):
+            own, unfelt = exchanges(problem, contacts)
+            if not unfelt.size:
+                continue
+            r, unique = _with_least(solution.reactions, own, unfelt)
+            residual = natural_map_residual(problem, r, solution.multipliers)
+            if residual <= max(solution.residual, tol):
+                solution = replace(solution, reactions=r, residual=residual)
+                left = not unique or _rubs(r[at])
+                break
+            left = True
+        if left:
+            note(
+                logging.getLogger(__name__),
+                f"at ({place_words(problem.coordinates.T[at[0]])}), where several surfaces meet,"
+                " the contact forces are not unique: forces that the contacts there exchange"
+                " change nothing else",
+            )
+    return solution
+
+
+def places(problem: InterfaceProblem) -> list[np.ndarray]:
+    """The contacts at every place that has several."""
+    points = problem.coordinates.T
+    if not has_entries(problem.Q) or len(points) != problem.contacts or problem.contacts < 2:
+        return []
+    cell = np.round(points / (TOGETHER * np.ptp(points, axis=0).max() or 1.0))
+    own, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)[1:]
+    own = own.ravel()
+    order = np.argsort(own, kind="stable")
+    return [one for one in np.split(order, np.cumsum(counts)[:-1]) if len(one) > 1]
+
+
+def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unknowns (m,) of the forces of some contacts, and a basis (m, j) of those changes y of
+    them with Q y = 0 and V' y = 0.
+    """
+    Q, dim = problem.Q, problem.dim
+    free = np.zeros((problem.contacts, dim), dtype=bool)
+    free[contacts, 0], free[contacts, 1:] = True, problem.law.rough[contacts, None]
+    own = np.flatnonzero(free.ravel() & ~immovable(problem))
+    if not len(own):
+        return own, np.zeros((0, 0))
+    rows = own if problem.symmetric else slice(None)  # y'Q y = 0 if and only if Q y = 0
+    columns = Q[rows][:, own] if form(Q) == "array" else Q[rows][:, own].toarray()
+    felt = np.vstack([columns / (np.abs(columns).max() or 1.0), problem.V[own].T])
+    sizes, directions = np.linalg.svd(felt, full_matrices=len(felt) < len(own))[1:]
+    small = np.pad(sizes, (0, len(own) - len(sizes))) <= UNFELT
+    return own, directions[small].T
+
+
+def _closed(problem: InterfaceProblem, r: np.ndarray, at: np.ndarray) -> Iterator[np.ndarray]:
+    """Of some contacts those that are pressed, then of these those within friction."""
+    normal = np.where(problem.law.lowest < 0, np.inf, r[:, 0])[at]
+    pressed = at[normal > INSIDE * np.abs(r[:, 0]).max()]
+    yield pressed
+    bound = (1 - INSIDE) * problem.law.bound(r[:, 0])
+    inside = np.linalg.norm(r[:, 1:], axis=1) < bound
+    yield pressed[(inside | ~problem.law.rough)[pressed]]
+
+
+def _with_least(r: np.ndarray, own: np.ndarray, unfelt: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Forces (k, dim) with the least friction among those that are exchanged, and whether there is
+    one choice only.
+    """
+    tangents = np.flatnonzero(own % r.shape[1])
+    friction = r.ravel()[own[tangents]]
+    y, _, rank, _ = np.linalg.lstsq(unfelt[tangents], -friction, rcond=None)
+    changed = r.ravel().copy()
+    changed[own] += unfelt @ y
+    return changed.reshape(r.shape), rank == unfelt.shape[1]
+
+
+def _rubs(r: np.ndarray) -> bool:
+    """Whether some of these forces have friction."""
+    return bool(np.abs(r[:, 1:]).max(initial=0.0) > INSIDE * np.abs(r).max(initial=0.0))
