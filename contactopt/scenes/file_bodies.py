@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import make_mesh
@@ -169,13 +170,13 @@ def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
     )
 
 
-def _support(table: Table, mesh: Any, reading: Reading) -> Support:
+def _support(table: Table, mesh: Mesh, reading: Reading) -> Support:
     boundary, values = _boundary(table, "boundary", mesh), reading.numbers(table)
     table.close()
     return Support(boundary, values or None)
 
 
-def _boundary(table: Table, key: str, mesh: Any) -> str:
+def _boundary(table: Table, key: str, mesh: Mesh) -> str:
     name = table.take(key, str, needed=True)
     known = mesh.boundaries or {}
     if name not in known:
