@@ -69,20 +69,21 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
             raise InputError(f"body '{part.name}', boundary '{name}': {error}") from None
     return Assembly(
         part.name,
-        kind,
-        part.material,
-        basis,
-        weight,
         A,
         _load(part, basis, weight),
         fixed.prescribed,
         np.flatnonzero(~fixed.held),
         fixed.motion,
         np.array(fixed.plate_forces, dtype=float),
-        traces,
         rigid_motions,
         tuple(fixed.driven),
         fixed.holders,
+        reload_body,
+        kind,
+        part.material,
+        basis,
+        weight,
+        traces,
         _mirrored_nodes(scene, part, basis, fixed.held),
     )
 
