@@ -14,6 +14,7 @@ from contactopt.bodies import assemble
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.protocol import Body
 from contactopt.checks import check_count, check_number
+from contactopt.coupling.bolts import check_bolts
 from contactopt.coupling.coupling import Coupling, couple, law_of, tested
 from contactopt.coupling.crosspoints import independent
 from contactopt.coupling.joined_once import check_once
@@ -47,6 +48,7 @@ def posed(
     """
     elements, zone = _checked(scene, elements, zone, Q)
     assembled = tuple(each(lambda part: assemble(scene, part, elements, zone), scene.parts))
+    check_bolts(scene, assembled)
     named = {body.name: body for body in assembled}
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     check_once(scene.pairs, sides)
