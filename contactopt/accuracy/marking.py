@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from contactopt.accuracy.polygon import other_polygon
+from contactopt.bodies.views import on_elements
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
@@ -203,7 +204,7 @@ def spread(reduction: Reduction, weights: np.ndarray) -> list[np.ndarray]:
     nodes they hold.
     """
     parts = zip(reduction.bodies, reduction.maps)
-    return [body.on_elements(np.asarray(abs(B).T @ weights.ravel())) for body, B in parts]
+    return [on_elements(body, np.asarray(abs(B).T @ weights.ravel())) for body, B in parts]
 
 
 def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:

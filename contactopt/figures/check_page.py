@@ -26,7 +26,7 @@ from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.scene import Part, Scene
 
-ROLES = ("no use", "support", "load", "plate", "contact")
+ROLES = ("no use", "support", "load", "plate", "bolt", "contact")
 NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundary that stay legible
 
 
@@ -124,8 +124,8 @@ def _write(
         move="move" if scene.dim == 2 else "turn",
         followers="",
         arrows="loads, supports, and normals from the lower to the upper body,",
-        convention="A negative gap is an overlap. The arrow of a plate is its total force. A"
-        " support holds along the axis of its triangles, along all axes if they are full.",
+        convention="A negative gap is an overlap. The arrow of a plate or bolt is its total force."
+        " A support holds along the axis of its triangles, along all axes if they are full.",
         pairs="",
         cells=_rows(lines if roles is ROLES else [f" {text}" for text in lines]),
     )
@@ -210,15 +210,18 @@ def _boundaries(
     loads = {load.boundary: load for load in part.loads}
     for name, item in _sides(mesh):
         load = loads.get(name)
-        role = (3 if load.level else 2) if load else 1 if name in held else 0
+        role = (4 if load.shared else 3 if load.level else 2) if load else 1 if name in held else 0
         if role == 0 and name in scene.surfaces_of(part):
             continue  # the pairs show it
         places, vector = item["places"], item["vector"]
         if load:
-            vector[:, : scene.dim] = load.density(*_normals(mesh, mesh.boundaries[name])).T
-        if load and load.level:
+            x, n = _normals(mesh, mesh.boundaries[name])
+            vector[:, : scene.dim] = load.density(x, n).T
+        if load and load.total:
             middle = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
-            vector[middle, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
+            mean = n.mean(axis=1) / np.linalg.norm(n.mean(axis=1))
+            vector[middle, : scene.dim] = load.resultant(scene.components, mean)
+            item["marked"] = np.arange(len(places)) == middle
         size = float(np.ptp(mesh.p, axis=1).max())
         if any(np.ptp(places[:, a]) <= 1e-9 * size >= abs(places[0, a] - x) for a, x in planes):
             item["hidden"] = True

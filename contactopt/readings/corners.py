@@ -19,6 +19,7 @@ import numpy as np
 from skfem import Mesh
 
 from contactopt.bodies.fields import Region
+from contactopt.bodies.views import stress_map
 from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import straight
@@ -60,7 +61,7 @@ def corner_remarks(reduction: Reduction, solution: Solution) -> list[str]:
 
 def at_re_entrant(reduction: Reduction, peak: Peak) -> bool:
     """Whether a peak of the stress lies at a re-entrant corner of its body."""
-    read = reduction.bodies[peak.body].stress_map(Region())
+    read = stress_map(reduction.bodies[peak.body], Region())
     if read is None:
         return False
     mesh = straight(read.mesh)

@@ -58,7 +58,7 @@ class State:
     def following(self, number: int, load: np.ndarray) -> np.ndarray:
         """(k, dim) what a load (n,) on a body moves the contacts by, without its motions."""
         body, B = self.reduction.bodies[number], self.reduction.maps[number]
-        moved = body.displacement(load, np.zeros(len(body.resultants))) - body.at_rest
+        moved = body.displacement(load, np.zeros(len(body.motions.resultants))) - body.at_rest
         return np.asarray(B @ moved).reshape(self.problem.q.shape)
 
     def law_change(self, which: Parameter) -> np.ndarray:

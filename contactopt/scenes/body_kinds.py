@@ -43,6 +43,10 @@ class Support:
             dict.fromkeys(components, 0.0) if self.displacement is None else {**self.displacement}
         )
 
+    def address(self, body: str) -> tuple[str, ...]:
+        """As Load.address."""
+        return body, self.boundary
+
     def with_values(self, values: Mapping[str, float]) -> Support:
         """As Load.with_values."""
         return replace(self, displacement=dict(values))

@@ -134,15 +134,16 @@ def _doubled(values: Any) -> Any:
     return {name: 2 * value for name, value in values.items()} if values else values
 
 
-def _of_both(load: Any) -> Any:
-    """A load that stands for two: a plate has the force of all images."""
-    return load.with_values(_doubled(load.force)) if load.level else load
+def _of_both(load: Any, components: tuple[str, ...]) -> Any:
+    """A load that stands for two: a plate and a bolt have the force of all images."""
+    return load.with_values(_doubled(load.values(components))) if load.total else load
 
 
 def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component: str) -> Part:
     name, own = part.name, whole.meshes[part.name].boundaries or {}
+    components = whole.scene.components
     if images.bodies[name] != name:
-        return replace(part, loads=tuple(map(_of_both, part.loads)))
+        return replace(part, loads=tuple(_of_both(load, components) for load in part.loads))
     cut = f"symmetry {component}"
     while cut in own:
         cut += "'"
@@ -154,9 +155,11 @@ def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component
     supports.append(Support(cut, {component: 0.0}))
     loads: list[Any] = []
     for number, load in enumerate(part.loads):
-        if not load.level or (name, number) not in images.own:
+        if (name, number) not in images.own:
             if not load.boundary or there(load.boundary):
-                loads.append(_of_both(load))
+                loads.append(_of_both(load, components))
+        elif not load.level:
+            loads.append(load)
         else:
             loads.append(load.with_values(_without(load.force, component)))
             if component in load.force and not load.glued:

@@ -157,8 +157,11 @@ def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
         return
     for item in (*part.supports, *part.loads):
         kind = item.what + ("" if getattr(item, "glued", True) else " that slides")
+        kind += "" if getattr(item, "tilting", True) else " that stays parallel"
         values = item.values(components)
         space = held_space(components, values)
+        if (way := getattr(item, "direction", None)) is not None:
+            space = np.outer(way, way) / np.dot(way, way), space[1]
         yield _Condition(kind, item.boundary, *space, item, values.get("", 0.0))
 
 
@@ -213,7 +216,7 @@ class _Comparison:
                     and np.isclose(one.number, two.number, EQUAL, 0.0)
                 )
                 if same and (not one.where or self.fits(part.name, one.where, two.where)):
-                    if one.item is two.item and getattr(one.item, "level", False):
+                    if one.item is two.item and getattr(one.item, "total", False):
                         found.add((part.name, part.loads.index(one.item)))
                     break
             else:

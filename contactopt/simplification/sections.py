@@ -108,7 +108,7 @@ def _spoils(prism: _Prism) -> str:
             values, acting = load.values(whole.scene.components), both[:0]
             if "" in values:
                 acting = np.intersect1d(both, mesh.boundaries[load.boundary])
-            if values.get(component) or len(acting):
+            if values.get(component) or len(acting) or getattr(load, "direction", None):
                 where = f" on {load.boundary!r}" if load.boundary else ""
                 return f"the {load.what}{where} of body '{name}' acts along the axis"
     for pair in whole.scene.pairs:
