@@ -39,6 +39,7 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.accuracy.marking import divisible, finer, with_bent_edges
+from contactopt.bodies.views import energy
 from contactopt.cards import force_unit
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.errors import InputError, Unbalanced
@@ -264,7 +265,9 @@ class _Push:
         if not np.abs(load).max(initial=0.0) > NOTHING * size:
             return None
         bodies = zip(base.bodies, loaded.bodies)
-        work = [2 * old.energy(new.at_rest - old.at_rest) for old, new in bodies]
+        work = [
+            2 * energy(old, moved := new.at_rest - old.at_rest, 0 * moved) for old, new in bodies
+        ]
         return cls(base.problem, (loaded.problem.q - base.problem.q).ravel(), load, sum(work))
 
     @property

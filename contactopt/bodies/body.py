@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import Any
 
 import numpy as np
 import skfem
+from skfem import Mesh
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
@@ -74,20 +74,21 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
             raise InputError(f"body '{part.name}', boundary '{name}': {error}") from None
     return Assembly(
         part.name,
-        kind,
-        part.material,
-        basis,
-        weight,
         A,
         _load(part, basis, weight),
         fixed.prescribed,
         np.flatnonzero(~fixed.held),
         fixed.motion,
         np.array(fixed.plate_forces, dtype=float),
-        traces,
         rigid_motions,
         tuple(fixed.driven),
         fixed.holders,
+        reload_body,
+        kind,
+        part.material,
+        basis,
+        weight,
+        traces,
         _mirrored_nodes(scene, part, basis, fixed.held),
     )
 
@@ -167,7 +168,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
 
 
-def _words(mesh: Any) -> str:
+def _words(mesh: Mesh) -> str:
     """What a mesh that does not fit is."""
     if not isinstance(mesh, skfem.Mesh):
         return type(mesh).__name__

@@ -113,8 +113,8 @@ def problem_of(
     q[:, 0] = gap
     for body, B in zip(bodies, maps):
         q += (B @ body.at_rest).reshape(q.shape)
-    V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
-    s = np.concatenate([body.resultants for body in bodies])
+    V = np.concatenate([B @ body.motions.fields for body, B in zip(bodies, maps)], axis=1)
+    s = np.concatenate([body.motions.resultants for body in bodies])
     areas = np.concatenate([made.areas for made in couplings])
     points = np.concatenate([made.positions for made in couplings], axis=1)
     ends = np.cumsum([0, *(len(made.gap) for made in couplings)]).tolist()
@@ -124,5 +124,5 @@ def problem_of(
     law = laws[0][0] if len(laws) == 1 else join(laws)
     chart = pairs[0].chart if len(pairs) == 1 else None
     # what each multiplier is, for messages
-    names = tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motion_names)
+    names = tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motions.names)
     return InterfaceProblem(Q, q, law, V, s, areas, points, chart, pairs, names)

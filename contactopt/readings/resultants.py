@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import acting, held_by, plates
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
 from contactopt.problem.cones import lengths
@@ -78,11 +79,13 @@ def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resul
     named = {body.name: body for body in reduction.bodies}
     space, found = space_forces(reduction, solution), {}
     for pair, own, made in zip(reduction.scene.pairs, reduction.problem.pairs, reduction.couplings):
-        forces, acting = solution.reactions[own.contacts].ravel(), None
+        forces, there = solution.reactions[own.contacts].ravel(), None
         for name, trace in zip(pair.bodies, (made.upper, made.lower)):
-            acting = named[name].acting(trace.T @ forces) if acting is None else acting
+            view = named[name].view
+            if there is None and view is not None:
+                there = acting(view, trace.T @ forces)
         points = reduction.problem.coordinates[:, own.contacts]
-        found[own.name] = _resultant(reduction, *(acting or (points, space[:, own.contacts])))
+        found[own.name] = _resultant(reduction, *(there or (points, space[:, own.contacts])))
     return found
 
 
@@ -92,7 +95,7 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
     """
     found, displaced = {}, reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        for name, held in body.held_by(U, B.T @ solution.reactions.ravel()).items():
+        for name, held in held_by(body, U, B.T @ solution.reactions.ravel()).items():
             found[f"body '{body.name}', {name}"] = _resultant(reduction, *held)
     return found
 
@@ -148,8 +151,8 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     names = reduction.problem.motions or range(len(solution.multipliers))
     found |= {f"motion:{name}": float(x) for name, x in zip(names, solution.multipliers)}
     for body, U in zip(reduction.bodies, reduction.displaced(solution)):
-        plates = body.plates(U).items()
-        found |= {f"motion:body '{body.name}': {name}": value for name, value in plates}
+        moved = plates(body, U).items()
+        found |= {f"motion:body '{body.name}': {name}": value for name, value in moved}
     every = pair_resultants(reduction, solution) | holder_resultants(reduction, solution)
     turns = axes if reduction.problem.dim == 3 else ("z",)
     for name, own in every.items():

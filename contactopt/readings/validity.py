@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import limits
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
@@ -85,7 +86,7 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     moved = reduction.seen(displaced)
     scale = np.zeros(len(moved))
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
+        known = bodies[body.name] = limits(body, U, B.T @ reactions)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
         if known["imbalance"] > BOUNDS["imbalance"]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import make_mesh
@@ -190,7 +191,7 @@ def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
     )
 
 
-def _support(table: Table, mesh: Any, reading: Reading) -> Support:
+def _support(table: Table, mesh: Mesh, reading: Reading) -> Support:
     what = 'a boundary, or those that meet in an edge or a point, as in "a/b"'
     name = table.take("boundary", str, needed=True, what=what)
     made = Support(name, reading.numbers(table) or None)
@@ -200,11 +201,11 @@ def _support(table: Table, mesh: Any, reading: Reading) -> Support:
     return made
 
 
-def _boundary(table: Table, key: str, mesh: Any) -> str:
+def _boundary(table: Table, key: str, mesh: Mesh) -> str:
     return _named(table, key, table.take(key, str, needed=True), mesh, "the body")
 
 
-def _named(table: Table, key: str, name: str, mesh: Any, body: str) -> str:
+def _named(table: Table, key: str, name: str, mesh: Mesh, body: str) -> str:
     """The name of a boundary of a mesh."""
     known = mesh.boundaries or {}
     if name not in known:
