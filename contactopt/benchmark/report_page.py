@@ -37,7 +37,7 @@ from contactopt.benchmark.ranking import (
 )
 from contactopt.benchmark.reports import write_report
 from contactopt.benchmark.store import ABSENT, require
-from contactopt.benchmark.testset import problems
+from contactopt.benchmark.testset import SETS, problems
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, write_html
 from contactopt.figures.style import COLOURS
@@ -105,7 +105,8 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
     """What the page shows of the runs."""
     found = points(table)
     names, methods = list(dict.fromkeys(table["problem"])), sorted(set(table["method"]))
-    of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in problems()}
+    sets = (one for number in SETS for one in problems(testset=number))
+    of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in sets}
     tags = {name: _tags(rows.iloc[0], of_set) for name, rows in table.groupby("problem")}
     accuracies = _accuracies(found)
     times = [achieved(found, a).reindex(names)[methods] for a in accuracies]
