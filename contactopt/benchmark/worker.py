@@ -243,7 +243,7 @@ def _call(task: Task) -> Call:
             raise InputError(f"method '{spec.name}' takes no 'start', the forces to begin with.")
         more = {"start": before.pop()} if warm else {}
         more |= {"time_limit": limit} if "time_limit" in passed else {}
-        answer = _read(make(problem, **passed | spec.settings | more), spec.label)
+        answer = _read(make(problem, **{**passed, **spec.settings, **more}), spec.label)
         before[:] = [answer.reactions]
         return answer
 

@@ -76,7 +76,7 @@ def _print_solutions(one: Problem) -> None:
     elif (tags.get("solutions") or 0) > 1 and tags["contacts"] <= SHOWN:
         from contactopt.methods.enumeration import all_solutions
 
-        for number, solution in enumerate(all_solutions(*states_of(one.load())), 1):
+        for number, solution in enumerate(all_solutions(states_of(one.load())[0]), 1):
             forces = np.array2string(solution.reactions.ravel(), precision=6, suppress_small=True)
             print(f"solution {number}: forces {forces}, certificate {solution.residual:.1e}")
 

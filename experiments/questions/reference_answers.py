@@ -251,7 +251,7 @@ def report(name: str) -> None:
         f"{stored.count(tier)} of {sum(one.tier == tier for one in of_set)} {tier}"
         for tier in testset.TIERS
     )
-    text = TEXT.format(tol=TOL, stored=len(stored), all=len(of_set), tiers=tiers)
+    text = TEXT.format(name=name, tol=TOL, stored=len(stored), all=len(of_set), tiers=tiers)
     tables = {"families": rows} | ({"missing": missing} if missing else {})
     write("reference_answers", "Reference answers", text, tables, {})
 

@@ -49,7 +49,7 @@ class Problem:
     @cached_property
     def tags(self) -> dict[str, Any]:
         """What the problem is like; computed, where the set's file does not say it."""
-        return dict(self.known.get("tags") or tags_of(self.load()))
+        return {"states": 1} | dict(self.known.get("tags") or tags_of(self.load()))
 
     @property
     def reference(self) -> dict[str, Any] | None:
