@@ -252,8 +252,8 @@ class ElasticBody(Body):
     def fields(self, U: np.ndarray) -> Fields:
         return fields_of(self.body, U)
 
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
-        return limits_of(self.body, U, force)
+    def limits(self, U: np.ndarray, force: np.ndarray, least: float = 0.0) -> Validity:
+        return limits_of(self.body, U, force, least)
 
     def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
         return recovery_errors(self.body, U, *others)

@@ -219,8 +219,10 @@ class Body(ABC):
         """Displacement and stress inside the body; None for a body without any."""
         return None
 
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
-        """How far it is from equilibrium, strained and turned; zeros without own equations."""
+    def limits(self, U: np.ndarray, force: np.ndarray, least: float = 0.0) -> Validity:
+        """How far it is from equilibrium, strained and turned; zeros without own equations. Forces
+        on it whose sum is at most `least` are none.
+        """
         return Validity()
 
     def grounded(self, modulus: float) -> Body:
