@@ -128,9 +128,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     return SimpleNamespace(
         name=body.name,
         at_rest=np.zeros(len(R)),
-        motions=FreeMotions(
-            Z, tuple(names), work(Z, body.load) + (mean @ Z).T @ body.plate_forces
-        ),
+        motions=FreeMotions(Z, tuple(names), work(Z, body.load) + (mean @ Z).T @ body.plate_forces),
     )
 
 
