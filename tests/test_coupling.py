@@ -24,6 +24,7 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies import BODIES
+from contactopt.bodies.protocol import Seen
 from contactopt.bodies.rigid import RigidBody
 from contactopt.coupling import coupling, matching
 from contactopt.coupling.coupling import COUPLINGS, Coupling
@@ -246,20 +247,18 @@ class Sprung(Rigid):
 
 @dataclass(frozen=True, eq=False)
 class SprungBody(RigidBody):
-    def product(self, T):
-        return lambda X, accuracy: T @ (T.T @ X) / self.part.k
+    def through(self, T):
+        def entries():
+            return (T @ T.T).toarray() / self.part.k
 
-    def compliance(self, T):
-        return (T @ T.T).toarray() / self.part.k
-
-    def moved(self, T):
-        return np.asarray(abs(T).sum(axis=1)).ravel() > 0
+        moved = np.asarray(abs(T).sum(axis=1)).ravel() > 0
+        return Seen(lambda X, _: T @ (T.T @ X) / self.part.k, entries, moved)
 
     def displacement(self, force, multipliers, free=None):
         return force / self.part.k
 
-    def energy(self, U):
-        return self.part.k * float(U @ U) / 2
+    def internal_forces(self, U, force):
+        return self.part.k * U
 
 
 def assemble_sprung(scene, part, elements, zone):
@@ -295,10 +294,10 @@ def test_parts_of_no_known_kind_are_refused():
 def test_an_explicit_operator_costs_no_product(monkeypatch):
     from contactopt.bodies.elastic import ElasticBody
 
-    def refused(self, T):
-        raise AssertionError("a product was prepared")
+    def refused(self, force, accuracy=None):
+        raise AssertionError("a product was made")
 
-    monkeypatch.setattr(ElasticBody, "product", refused)
+    monkeypatch.setattr(ElasticBody, "_restricted", refused)
     assert isinstance(reduce(scenes.flat_punch(2, elements=4), Q="explicit").Q, np.ndarray)
 
 

@@ -11,8 +11,9 @@ from contactopt.bodies.assembled import Guides
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 
-# A polygon in a circle leaves its plane of symmetry with half of the slope of its second vertex, or
-# .8 of it where the second facet has a quarter of the length of the first; a plane with all of it.
+# A polygon in a circle leaves its plane of symmetry with half of the slope of its second vertex or
+# less, or .8 of it where the second facet has a quarter of the length of the first; a plane with
+# all of it.
 EDGE = 0.85
 NEAR = 1e-9  # what counts as zero beside the size of a surface or of all bodies, or beside one
 
@@ -77,9 +78,13 @@ def smooth_across(contacts: ContactPoints, plane: SymmetryPlane) -> bool:
     it has an edge there, such as a slanted plane, and keeps its own normals.
     """
     within = plane.contains(contacts.points, contacts.size)
-    around = np.unique(contacts.cells[:, within[contacts.cells].any(axis=0)])
     slope = np.abs(plane.inward @ contacts.normals)
-    beside = around[~within[around]]
+    reached, beside = within, np.zeros(0, dtype=int)
+    for _ in range(2):  # two cells: the halves of a quadratic facet have one normal
+        around = np.unique(contacts.cells[:, reached[contacts.cells].any(axis=0)])
+        further = around[~reached[around]]
+        beside = further if len(further) else beside
+        reached = reached | np.isin(np.arange(len(slope)), around)
     return bool(
         not beside.size
         or slope[within].max(initial=0.0) <= NEAR
