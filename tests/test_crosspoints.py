@@ -175,16 +175,16 @@ def test_eight_bodies_at_a_point_bear_a_uniform_stress(cells, degree, laws):
 
 
 @pytest.mark.parametrize("dim, cells", [(2, (4,) * 4), (2, (4, 5, 6, 3)), (3, (2,) * 8)])
-def test_contacts_at_a_corner_that_exchange_forces_are_told(dim, cells):
-    """What they exchange is the kernel of their columns of Q: any small share is a solution, too.
-    Without friction, and where ties take part, the forces are unique.
+def test_of_forces_that_a_corner_can_exchange_those_with_the_least_friction_are_given(dim, cells):
+    """What contacts exchange is the kernel of their columns of Q: any small share is a solution,
+    too. Without friction, and where ties take part, the forces are unique.
     """
     scene, _ = quarters(cells, ("coulomb",) * dim, dim)
     problem = reduce_bodies(scene).problem
     solution = solve(problem)
     alike = len({*cells}) == 1
-    told = [note for note in solution.notes if "the contact forces are not unique" in note]
-    assert len(told) == alike and all("1, 1)" in note for note in told)
+    assert not any("are not unique" in note for note in solution.notes)
+    assert np.abs(solution.reactions[:, 1:]).max() < 1e-6 * solution.reactions.max()
     if alike:
         there = np.repeat(np.all(problem.coordinates.T == 1.0, axis=1), dim)
         y = np.zeros(problem.q.size)
