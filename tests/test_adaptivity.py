@@ -281,6 +281,7 @@ def test_run_takes_it_and_says_what_it_did(tmp_path, capsys):
         run("punch-2d", accuracy=0.1, quantity="friction_work", adaptive=True)
 
 
+@pytest.mark.slow
 def test_a_hysteresis_loop_has_a_known_error():
     states = scenes.shear_cycle(2, steps=2, shear=45.0)
     solved, estimate = refine(states, "friction_work", 0.03, adaptive=True)

@@ -57,13 +57,9 @@ class Shapes:
 
 
 def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
-    """Put a scene, whose mesh functions make coarse first meshes, on meshes of straight elements,
-    and find the curves of their boundaries; with `simplicial` quadrilaterals and hexahedra are cut
-    into triangles and tetrahedra.
-
-    A boundary follows the `curve` of its part or the edges of second order of its file. Without
-    them the curve is a guess, the smooth outline through the nodes of the first mesh
-    (contactopt.meshes.curves).
+    """Put a scene on meshes of straight elements, with `simplicial` of simplices, and find the
+    curves of their boundaries: those of its parts or files, else the smooth outline of the first
+    mesh as a guess.
     """
     curves: dict[str, dict[str, Curve]] = {}
     guessed: dict[str, dict[str, Function | None]] = {}
@@ -122,11 +118,8 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
 
 
 def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
-    """The scene with the marked elements of every body divided; with all of them where nothing is
-    said.
-
-    Facets that face much finer ones of another body are divided with them (`balanced`), until none
-    is left.
+    """The scene with the marked elements of every body divided (None: all), and facets that face
+    much finer ones with them (`balanced`), until none is left.
     """
     if marked is None:
         return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
@@ -162,11 +155,8 @@ def unknowns(scene: Scene) -> int:
 
 
 def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Mark more elements of meshes of simplices, for each body beside those that are marked, so
-    that surfaces that face each other stay about as fine as each other.
-
-    A surface that is much finer than the one that it touches sees the facets of the other one as a
-    polygon, whose corners press with a pressure that grows with every refinement of the fine side.
+    """Mark more elements so that surfaces that face each other stay about as fine: a much finer one
+    sees the other as a polygon, whose corners press ever harder.
     """
     chosen = [set(elements.tolist()) for elements in marked]
     names = [part.name for part in scene.parts]
@@ -216,11 +206,9 @@ def spread(reduction: Reduction, weights: np.ndarray) -> list[np.ndarray]:
 
 
 def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:
-    """Numbers of the contacts that press at least as much as the least of some peaks on their own
-    pair of surfaces.
-
-    Where many peaks come close to the largest one, the pressure is nearly even: its surface is then
-    divided as one, since facets of different lengths would make peaks of their own.
+    """Contacts that press at least as much as the least of some peaks on their own pair. Where many
+    peaks come close to the largest one, the surface is divided as one, since facets of different
+    lengths would make peaks of their own.
     """
     least = np.full(len(pressure), np.inf)
     for pair in reduction.problem.pairs:
@@ -231,12 +219,9 @@ def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -
 
 
 def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Find the contacts between which the gap of a rigid body is smaller than at the contacts,
-    where `touching` (k,) touch and the surfaces are `apart` (k,) [length].
-
-    Gap functions are sampled within every facet. Counted is where the sample undercuts what the
-    facet has between its nodes by more than the surfaces are apart there and CLOSURE of the
-    closure. Returned are the contacts at the corners of such facets.
+    """The contacts between which the gap of a rigid body, sampled within every facet, undercuts
+    what the facet has between its nodes by more than the surfaces are `apart` (k,) [length] and
+    CLOSURE of the closure, which those `touching` (k,) show.
     """
     scene, problem = reduction.scene, reduction.problem
     found = [np.empty(0, dtype=int)]

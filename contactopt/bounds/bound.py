@@ -153,9 +153,8 @@ class Bound:
     def balanced_with(
         self, tractions: np.ndarray, multipliers: np.ndarray, forces: tuple[Any, ...] | None = None
     ) -> Data:
-        """Stresses in equilibrium with contact tractions and the loads of the scene; of an adjoint
-        those with the `forces` on its bodies, if any, in place of the loads: the forces A u_h are
-        those of the stress of v.
+        """Stresses in equilibrium with contact tractions and the loads; of an adjoint with the
+        `forces` on its bodies in their place, where the forces A u_h are those of the stress of v.
         """
         scene, out = self.scene, list[Any]()
         own = scene.reduction.own_multipliers(multipliers)

@@ -46,8 +46,7 @@ def displaced_stress(
     cells: Any, material: Material, nodal: np.ndarray, at: np.ndarray, r: np.ndarray | None
 ) -> np.ndarray:
     """Components xx, yy, xy and the one across (e, s, 4) of the stress under displacements (2,
-    vertices and edges), at points with the shares (3, s) of the vertices. In a body of revolution
-    `r` are their radii (e, s).
+    vertices and edges), at shares (3, s) of the vertices; `r` (e, s) radii, if revolved.
     """
     lam, shear = lame(material)
     (i, j), edges = cells.between

@@ -41,9 +41,9 @@ class Points(NamedTuple):
 
 
 class _Side(NamedTuple):
-    """An elastic surface of a pair: the number of its body, 1 for the upper and -1 for the lower
-    one, its facets, of these the vertices (dim, f), the nodes of a quadratic displacement (q, f)
-    and the contacts at the vertices (dim, f), -1 where there is none.
+    """An elastic surface of a pair: number of its body, 1 (upper) or -1, facets, their vertices
+    (dim, f), nodes of quadratic displacements (q, f), and contacts (dim, f), -1 where there is
+    none.
     """
 
     body: int
@@ -194,9 +194,9 @@ class FacingFacets:
 
 
 def joined_points(points: Sequence[np.ndarray], frame: np.ndarray) -> tuple[Points, Points, Points]:
-    """Points for integrals over the pieces, common to a facet of each, of two plane surfaces (dim,
-    v, f) that face each other along frame[0]; the nodes of the first one's facets; and those of the
-    pieces, which are intervals or triangles.
+    """Points for integrals over the pieces, intervals or triangles, common to facets of two plane
+    surfaces (dim, v, f) that face each other along frame[0]; the nodes of the first one's facets;
+    and those of the pieces.
     """
     d = len(frame)
     own, other = (np.einsum("ad,dvf->fva", frame[1:], x) for x in points)

@@ -167,7 +167,6 @@ def _with_slip(
     bound: Any, pair: FacingFacets, z: list[np.ndarray], omega: np.ndarray, limit: float
 ) -> tuple[np.ndarray, float]:
     """Make y_t vanish where the surfaces of a pair stick, and stay below `limit` times the slip.
-
     Returns the direction e (f, 1) of each facet, zero where y_t is zero, and c.
     """
     side = pair.sides[0]

@@ -12,9 +12,8 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Simplices:
-    """Straight-edged triangles or tetrahedra, with displacements and stresses on them.
-
-    mesh  of scikit-fem, whose vertices are p (dim, vertices) and t (dim + 1, e)
+    """Straight-edged triangles or tetrahedra of scikit-fem, with displacements and stresses on
+    them.
     """
 
     mesh: Any

@@ -97,9 +97,9 @@ def least_energy(
     size: np.ndarray,
     square: np.ndarray,
 ) -> np.ndarray:
-    """An upper bound (f,) of the least energies of stresses in f `elements`, without divergence,
-    with tractions d on one facet whose moments are zero, and with none on the others. The facets
-    have areas `size` (f,), and `square` (f, 3, 3) are the integrals of d d' over them.
+    """An upper bound (f,) of the least energies of stresses in `elements`, without divergence, with
+    tractions d on one facet of area `size` (f,) and none on the others; the moments of d are zero,
+    and `square` (f, 3, 3) integrals of d d'.
     """
     regular = regular_tetrahedron()
     points = regular.mesh.p

@@ -235,10 +235,8 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
 
 
 def chain_of(result: Any, distance: float | None = None) -> Chain:
-    """The solved states of a result, to differentiate through: of what contactopt.run or
-    contactopt.follow returned, or of anything else with a reduction and a solution.
-
-    InputError for a result without a solved scene, and for a state that is not certified.
+    """The solved states of a result, to differentiate through. InputError for a result without a
+    solved scene, and for a state that is not certified.
     """
     path = result if isinstance(result, PathResult) else getattr(result, "path", None)
     if path is None:

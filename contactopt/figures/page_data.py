@@ -181,10 +181,7 @@ def body_arrays(
     mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool
 ) -> dict[str, Any]:
     """What is drawn of a body: its surface, in 2D all of it, and with `inside` its elements; values
-    at their nodes.
-
-    What lies in a plane of symmetry is apart, because it belongs to no surface and no edge of the
-    whole body.
+    at their nodes. What lies in a plane of symmetry is apart.
     """
     (block,) = mesh.cells
     kind, faces = surface(block.type, block.data, mesh.points)

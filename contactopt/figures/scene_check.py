@@ -70,11 +70,8 @@ class SceneCheck:
 def check_scene(
     states: Sequence[Scene], solve: dict[str, Any] | None = None, told: Sequence[str] = ()
 ) -> SceneCheck:
-    """Look at a scene without solving it. InputError for a scene that cannot be solved at all.
-
-    states  the scene, or the states of its load path, of which the last one is described
-    solve   options of the run that it is meant for: method, Q, solver
-    told    remarks that were made before, when the scene was read
+    """Look at a scene, or the last state of a load path, without solving it. `solve` are options of
+    the run (method, Q, solver), `told` earlier remarks. InputError for what cannot be solved.
     """
     scene, options = states[-1], solve or {}
     with overheard() as heard:
@@ -118,9 +115,8 @@ def _free_problem(scene: Scene, made: Posed) -> InterfaceProblem:
 
 
 def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
-    """The rigid motions (n, m) of an elastic body that leave supports at rest and plates level,
-    and the resultants (m,) of its loads in them. The displacement of a plate in a motion is the
-    mean of that of its nodes.
+    """The rigid motions (n, m) of an elastic body that leave supports at rest and plates level, and
+    the resultants (m,) of its loads in them.
     """
     body = assembled.body
     R, labels = whole_motions(scene.analysis, body.basis)

@@ -28,11 +28,7 @@ if TYPE_CHECKING:
 
 
 class Repeated(Exception):
-    """Thrown by the driver into `iterate` where it yields, because its iterates come back to
-    earlier ones.
-
-    A method that has another way to go on catches it. All others end.
-    """
+    """Thrown into `iterate` because its iterates repeat. A method that has another way goes on."""
 
 
 class NoSolution(Exception):

@@ -80,13 +80,10 @@ def isotropic(problem: InterfaceProblem) -> InterfaceProblem:
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the
-    columns of V have length one. The Scales take its reactions and multipliers back.
+    columns of V have length one, in all units alike. The Scales take its answers back.
 
-    The force scale is the mean force that the balance asks of a node or, without a balance, the
-    force that removes the root-mean-square overlap at one node. Gaps, however wide, do not count.
-    Every change of units of the input gives the same numbers here. A component that cannot move (on
-    a symmetry plane, say) carries no force that matters: a unit compliance there makes that force
-    zero instead of undetermined.
+    The force scale is the mean force that the balance asks of a node or, without a balance, that
+    which removes the root-mean-square overlap. Components that cannot move get a unit compliance.
     """
     scales, held = scales_of(problem), immovable(problem)
     compliance, columns = scales.length / scales.force, scales.length / scales.multipliers

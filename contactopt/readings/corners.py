@@ -32,10 +32,7 @@ THERE = 0.05  # of the distance of contacts, within which a node is at the place
 
 
 def infinite(reduction: Reduction, solution: Solution, reading: Reading) -> str:
-    """One sentence if the largest value of a reading lies where it is infinite, or an empty text.
-
-    The reading belongs to the scene, with contacts numbered as there.
-    """
+    """One sentence if the largest value of a reading is where it is infinite, else nothing."""
     if not reading.peaks or not solution.solved:
         return ""
     peak = reading.peaks[0]
@@ -105,11 +102,8 @@ def _share(part: Any, scene: Any, place: np.ndarray, reach: float) -> float:
 
 
 def re_entrant(mesh: Any, vertex: int) -> bool:
-    """Whether a vertex, or one within two elements of it, is at a re-entrant corner of the body or
-    on such an edge.
-
-    The recovered stress at the corner itself looks from all sides, and may be less than that next
-    to it.
+    """Whether a vertex, or one within two elements of it, is at a re-entrant corner or edge. (The
+    recovered stress at the corner itself may be less than that next to it.)
     """
     cells = simplices(mesh)
     near = np.array([vertex])

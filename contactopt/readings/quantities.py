@@ -72,10 +72,8 @@ class Quantity:
 
 
 def find_quantity(name: Any, scene: Scene) -> Quantity:
-    """Find a quantity by its name, one from this module's head, before anything is solved.
-
-    InputError for an unknown quantity, and for a body, boundary, pair or place that the scene does
-    not have.
+    """Find a quantity by its name in this module's head, before anything is solved. InputError for
+    what the scene does not have.
     """
     if not isinstance(name, str):
         raise InputError(f"a quantity is given by its name; got {name!r}.")

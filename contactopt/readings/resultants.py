@@ -37,9 +37,8 @@ class Resultant:
 
 
 def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> Resultant:
-    """The resultant of nodal forces (dim, m) at points (dim, m), those of all mirror images
-    together or of whole rings, with components r and z. Mirror images across `planes` and the parts
-    of a ring balance each other but for what acts along the planes and along the axis.
+    """The resultant of nodal forces (dim, m) at points (dim, m), with all mirror images, or of
+    whole rings (r and z): images balance each other but along planes and axis.
     """
     if reduction.scene.analysis.revolved:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
@@ -53,9 +52,8 @@ def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> 
 
 
 def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
-    """The planes beyond which mirror images make the bodies whole, each as {"axis": name of a
-    coordinate, "place": [length]}. The axis of revolution counts as one in its section. The list is
-    empty where the bodies are whole, and where a plane does not lie across an axis.
+    """The planes beyond which mirror images make the bodies whole, an axis of revolution among
+    them, as {"axis": coordinate, "place": [length]}; none where one does not lie across an axis.
     """
     scene = reduction.scene
     if scene.analysis.revolved:
@@ -76,9 +74,8 @@ def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
 
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every pair of surfaces, by its name, the resultant of the contact forces on its upper
-    body: of the forces on the nodes, which balance those of the supports to rounding. Those on the
-    nodes of the lower body count where the upper one has none.
+    """For every pair, by name, the resultant of the contact forces on the nodes of its upper body;
+    of the lower one where the upper has none.
     """
     named = {body.name: body for body in reduction.bodies}
     space, found = space_forces(reduction, solution), {}
@@ -103,9 +100,8 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
 
 
 def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """The reduction and solution of every pair of surfaces by itself, for readers of its surface;
-    those of the scene where there is one pair only. A view has no displacements of the bodies,
-    since these need the forces of all pairs.
+    """The reduction and solution of every pair by itself, for readers of its surface. A view has no
+    displacements of the bodies, since these need the forces of all pairs.
     """
     if len(reduction.problem.pairs) == 1:
         return [(reduction, solution)]

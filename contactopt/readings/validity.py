@@ -37,10 +37,8 @@ UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facet
 
 
 def overlap_share(reduction: Reduction, solution: Solution) -> float:
-    """By which share the areas of two surfaces differ that overlap as they are drawn, the mean over
-    the contacts with their forces as weights [-].
-
-    Small displacements do not tell on which of the two a pressure acts.
+    """By which share the areas of surfaces that overlap as drawn differ, the mean weighted by
+    forces [-]: small displacements do not tell on which of the two a pressure acts.
     """
     shares = np.zeros(len(solution.reactions))
     ring = reduction.scene.kind == "axisymmetric"

@@ -15,12 +15,14 @@ import numpy as np
 from contactopt.checks import check_number, check_size, short
 from contactopt.errors import InputError
 from contactopt.scenes.body_kinds import Body, HalfSpace, Part, Rigid, Support
+from contactopt.scenes.body_shapes import LENGTHS
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.kinds import KINDS, Kind
 from contactopt.scenes.loads.body_force import BodyForce
 from contactopt.scenes.loads.plate import Plate
 from contactopt.scenes.loads.pressure import Pressure
 from contactopt.scenes.loads.traction import Traction
+from contactopt.scenes.material_library import STRESSES
 
 __all__ = [
     "BodyForce",
@@ -64,7 +66,9 @@ class Scene:
                function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the
                contact zone.
-    units      names of the units of length and stress, for the axes of figures
+    units      names of the units of length and stress, for figures and for checks of sizes. Any
+               names, but those of contactopt.scenes.body_shapes.LENGTHS and
+               contactopt.scenes.material_library.STRESSES are written as there: MPa, not mpa
     reference  an exact solution to compare with (contactopt.analytic.Reference), or None.
     """
 
@@ -111,6 +115,7 @@ class Scene:
             raise self._wrong(
                 f"the degree of the displacement must be 1 or 2; got {self.degree!r}."
             )
+        check_units(self.units)
         self._check_mirror()
         self._check_pairs()
         for part in self.parts:
@@ -274,6 +279,22 @@ class Scene:
         for name in names:
             if not any(name in pair.bodies for pair in pairs):
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")
+
+
+def check_units(units: Any) -> None:
+    """Raise InputError unless these are the names of a unit of length and of one of stress. A name
+    that is known but for its capital letters would not be known.
+    """
+    if not isinstance(units, (tuple, list)) or len(units) != 2:
+        raise InputError(
+            f"the units of a scene are two names, as in ('mm', 'MPa'); got {short(units)}."
+        )
+    for what, name, known in zip(("length", "stress"), units, (LENGTHS, STRESSES)):
+        if not isinstance(name, str) or not name.strip():
+            raise InputError(f"the unit of {what} must have a name; got {short(name)}.")
+        same = [own for own in known if own.lower() == name.strip().lower()]
+        if same and name not in same:
+            raise InputError(f"there is no unit of {what} {name!r}; did you mean {same[0]!r}?")
 
 
 def _curved(part: Any) -> bool:

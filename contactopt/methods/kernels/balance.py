@@ -39,15 +39,9 @@ def project_balanced(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve r = P(y - rho V lambda), V' r + s = 0 for r (k, d) and lambda (p,).
-
-    If no r in the set keeps the balance, the r of the last lambda comes back.
-
-    project      P and its derivative; P is a projection on a closed convex set that holds zero
-    y            (k, d) the point that is projected
-    V, s         (k d, p) rigid motions and (p,) resultants
-    step         rho, greater than 0: one number or one per contact (k,)
-    multipliers  (p,) where lambda starts;  steps  of Newton's method at most
+    """Solve r = P(y - rho V lambda), V' r + s = 0 for r (k, d) and lambda (p,), from `multipliers`,
+    in at most so many Newton `steps`; P projects on a closed convex set that holds zero, and
+    `step` is rho > 0. Without a solution the r of the last lambda comes back.
     """
     lam = multipliers
     if len(s) == 0:
