@@ -47,7 +47,7 @@ from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
-USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.ways`)
+USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.large_punch`)
 IDLE = 3  # steps without progress after which it begins anew
 
 

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.colors import ListedColormap
+from matplotlib.patches import Patch
 
 from contactopt.figures.style import (
     COLOURS,
     GREY,
     LETTERS,
     MARKS,
-    add_legend,
     label_ends,
     paper_axes,
 )
@@ -70,10 +70,10 @@ def letter(model: str) -> str:
     return next((sign for word, sign in SHORT.items() if word in model), model[:1])
 
 
-def draw_front(rows: list[Row]) -> Any:
+def draw_front(made: list[Row]) -> Any:
     """Seconds of the cheapest way to each accuracy, as a table of colours."""
     figure, (left, right) = paper_axes(columns=2, height=2.3)
-    made, scenes = front(rows), list(ASKED)
+    scenes = list(ASKED)
     for ax, name in ((left, "all models"), (right, "meshes")):
         grid = np.full((len(scenes), len(ACCURACIES)), np.nan)
         for row in made:
@@ -111,7 +111,13 @@ def draw_line(rows: list[Row], peers: list[Row]) -> Any:
         wrong = word in ("small body", "mu = .3")
         name = {"small body": "body too small", "mu = .3": "friction added"}.get(word, word)
         colour = GREY if wrong else COLOURS[number]
-        ax.loglog(x, y, MARKS[number] + ("--" if wrong else "-"), color=colour, mfc="white" if wrong else colour)
+        ax.loglog(
+            x,
+            y,
+            MARKS[number] + ("--" if wrong else "-"),
+            color=colour,
+            mfc="white" if wrong else colour,
+        )
         ends.append((x[-1], y[-1], name, colour))
     for code, mark in zip(dict.fromkeys(r["model"] for r in peers), "PX*"):
         line = sorted((r["cpu"], abs(r["peak"])) for r in peers if r["model"] == code)
@@ -125,13 +131,15 @@ def draw_line(rows: list[Row], peers: list[Row]) -> Any:
 
 
 def draw_regions(rows: list[Row]) -> Any:
-    """Which of four errors is the largest over mesh and tolerance, for two quantities and readings."""
+    """Which of four errors is the largest over mesh and tolerance."""
     figure, axes = paper_axes(columns=2, rows=2, height=1.5)
     colours = ListedColormap([COLOURS[7], COLOURS[5], COLOURS[4], "#bbbbbb"])
     panels = [(q, r) for q in ("peak", "width") for r in ("fitted", "nodes")]
     for ax, (quantity, reading) in zip(axes, panels):
         own = [r for r in rows if r["quantity"] == quantity and r["reading"] == reading]
-        meshes, tolerances = (list(dict.fromkeys(r[key] for r in own)) for key in ("mesh", "tolerance"))
+        meshes, tolerances = (
+            list(dict.fromkeys(r[key] for r in own)) for key in ("mesh", "tolerance")
+        )
         parts = np.array([[abs(r[f"{kind} error"]) for kind in KINDS] for r in own])
         shape = len(meshes), len(tolerances)
         ax.imshow(parts.argmax(axis=1).reshape(shape).T, cmap=colours, vmin=-0.5, vmax=3.5,
@@ -150,10 +158,10 @@ def draw_regions(rows: list[Row]) -> Any:
         ax.set_xlabel("elements across the half-width")
     for ax in axes[::2]:
         ax.set_ylabel("tolerance")
-    from matplotlib.patches import Patch
-
     signs = [Patch(color=colours(number), label=kind) for number, kind in enumerate(KINDS)]
-    figure.legend(handles=signs, ncols=4, loc="outside upper center", fontsize=LETTERS, frameon=False)
+    figure.legend(
+        handles=signs, ncols=4, loc="outside upper center", fontsize=LETTERS, frameon=False
+    )
     return figure
 
 
@@ -175,6 +183,3 @@ def draw_rule(rows: list[Row]) -> Any:
     ax.set_xticks([1, 2, 4], ["1", "2", "4"])
     ax.minorticks_off()
     return figure
-
-
-__all__ = ["add_legend", "draw_front", "draw_line", "draw_regions", "draw_rule", "front"]

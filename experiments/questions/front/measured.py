@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from statistics import median
 from typing import Any
 
@@ -108,7 +108,7 @@ def measure_model(model: Model) -> Iterator[Row]:
             row |= {"mesh": mesh, "tolerance": tol, "reading": "fitted", "unknowns": 0}
             row |= {"cpu": np.nan} | dict.fromkeys(QUANTITIES, np.nan)
             try:
-                row["cpu"], found = timed(lambda t=tol: solved(scene, mesh, t, model.method))
+                row["cpu"], found = timed(partial(solved, scene, mesh, tol, model.method))
             except Exception as error:
                 yield row | {"end": str(error).partition(".")[0][:80]}
                 continue

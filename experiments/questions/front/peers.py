@@ -1,4 +1,4 @@
-"""Other finite-element codes on Hertz's line contact: the nodes and elements are ours.
+"""Other codes on Hertz's contacts: the nodes and elements, or the points of Tamaas, are ours.
 
 A rigid indenter is pressed into the graded block by the depth that our solution has. Each code says
 which pressure it finds at the nodes of the block. The force that this pressure makes is the one to
@@ -16,7 +16,7 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,8 @@ import numpy as np
 import skfem
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from contactopt import Contact, Material, Part, Scene, Support
+from contactopt import Contact, Material, Part, Scene, Support, reduce_bodies
+from contactopt.analytic import contact_modulus
 from contactopt.bodies.calculix_deck import deck
 from contactopt.errors import InputError
 from contactopt.meshes.structured import tensor_mesh
@@ -32,18 +33,30 @@ from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
 from experiments.questions.accuracy.half_space import MATERIAL, indenter
 from experiments.questions.calculix import run
-from experiments.questions.whole_way.ours import round_contact
+from experiments.questions.front.bodies import LARGE, MARGIN, half_space, point
 
 FLATTER = 100.0
 REFINED = 4  # faces of the indenter over one of the block
 STIFF = 1e5  # modulus of CalculiX's indenter over that of the block
 LIMIT = 120.0  # s of wall time for one run
 HERE = Path(__file__).parent
-# code -> how to install it, environment variable that names its Python, and the usual one
-PYTHONS = {
-    "GetFEM": ("apt-get install python3-getfem", "GETFEM", "/usr/bin/python3"),
-    "Kratos": ("pip install KratosContactStructuralMechanicsApplication", "KRATOS", "python3"),
-}
+POINTS = (4, 8, 16, 32)  # of Tamaas, across the half-width of contact
+# what a Python that has Tamaas runs: the file that is given, and that of the answer
+TAMAAS = """
+import sys, time, numpy as np, tamaas as tm
+data = np.load(sys.argv[1])
+gap, length, modulus = data["gap"], float(data["length"]), float(data["modulus"])
+model = tm.Model(tm.model_type.basic_2d, [length, length], list(gap.shape))
+model.E, model.nu = modulus, 0.0
+kind = tm.PolonskyKeerRey.pressure
+solver = tm.PolonskyKeerRey(model, gap.max() - gap, 1e-9, kind, kind)
+tm.ModelFactory.registerNonPeriodic(model, "dcfft")
+solver.setIntegralOperator("dcfft")
+solver.max_iter = 5000
+start = time.process_time()
+solver.solve(float(data["pressure"]))
+np.savez(sys.argv[2], seconds=time.process_time() - start, pressure=np.array(model.traction))
+"""
 
 
 class Model:
@@ -114,50 +127,80 @@ def calculix(model: Model) -> tuple[np.ndarray, float]:
     return force / share, seconds
 
 
-def other(code: str) -> Callable[[Model], tuple[np.ndarray, float]]:
-    """The peer `code`, whose script stands beside this file and runs in a Python of its own."""
-
-    def solved(model: Model) -> tuple[np.ndarray, float]:
-        line, variable, usual = PYTHONS[code]
-        python = os.environ.get(variable, usual)
-        tip = model.indenter
-        given = {"p": model.block.p, "t": model.block.t, "indenter": tip.p, "cells": tip.t,
-                 "tip": np.flatnonzero(tip.p[1] < model.x[-1] / 2), "depth": model.depth,
-                 "radius": model.radius, "E": MATERIAL.E, "nu": MATERIAL.nu}  # fmt: skip
-        with tempfile.TemporaryDirectory() as name:
-            np.savez(Path(name) / "given.npz", **given, **model.nodes)
-            command = [python, str(HERE / f"{code.lower()}_hertz.py"), "given.npz", "answer.npz"]
-            done = subprocess.run(command, cwd=name, timeout=LIMIT, capture_output=True,
-                                  text=True)  # fmt: skip
-            answer = Path(name) / "answer.npz"
-            if not answer.exists():
-                last = "".join((done.stderr or done.stdout).strip().splitlines()[-1:])
-                absent = "ModuleNotFoundError" in last
-                raise RuntimeError(f"not installed: {line}" if absent else f"failed: {last}")
-            found = np.load(answer)
-            return found["pressure"], float(found["seconds"])
-
-    return solved
+def in_python(variable: str, usual: str, code: list[str], given: dict[str, Any]) -> Any:
+    """What a program writes in a Python of its own, named by an environment variable."""
+    python = os.environ.get(variable, usual)
+    with tempfile.TemporaryDirectory() as name:
+        np.savez(Path(name) / "given.npz", **given)
+        command = [python, *code, "given.npz", "answer.npz"]
+        done = subprocess.run(command, cwd=name, timeout=LIMIT, capture_output=True, text=True)
+        answer = Path(name) / "answer.npz"
+        if not answer.exists():
+            last = "".join((done.stderr or done.stdout).strip().splitlines()[-1:])
+            raise RuntimeError(f"{variable} names no Python that does it: {last}")
+        return dict(np.load(answer))
 
 
-CODES: dict[str, Callable[[Model], tuple[np.ndarray, float]]] = {
-    "CalculiX": calculix,
-    "GetFEM": other("GetFEM"),
-    "Kratos": other("Kratos"),
-}
+def getfem(model: Model) -> tuple[np.ndarray, float]:
+    """Pressure at the nodes of the contact boundary, and CPU seconds of GetFEM."""
+    tip = model.indenter
+    given = {"p": model.block.p, "t": model.block.t, "indenter": tip.p, "cells": tip.t,
+             "tip": np.flatnonzero(tip.p[1] < model.x[-1] / 2), "depth": model.depth,
+             "radius": model.radius, "E": MATERIAL.E, "nu": MATERIAL.nu}  # fmt: skip
+    script = [str(HERE / "getfem_hertz.py")]
+    found = in_python("GETFEM", "/usr/bin/python3", script, given | model.nodes)
+    return found["pressure"], float(found["seconds"])
 
 
-def hertz_line(code: str, elements: int, size: float) -> dict[str, Any]:
-    """Unknowns, seconds, and errors of the peak pressure and of the half-width."""
+def round_contact(distance: np.ndarray, pressure: np.ndarray, a: float) -> dict[str, float]:
+    """Peak and half-width of p^2 = p0^2 (1 - r^2 / a^2), fitted inside and near the edge of about
+    a; nan where too few points say it.
+    """
+    inner, edge = distance < 0.5 * a, (distance > 0.5 * a) & (distance < 0.95 * a)
+    degree, width = min(2, int(inner.sum()) - 1), np.nan
+    top = np.polyfit(distance[inner] ** 2, pressure[inner] ** 2, degree)[-1]
+    if edge.sum() > 2:
+        slope, at = np.polyfit(distance[edge] ** 2, pressure[edge] ** 2, 1)
+        width = float(np.sqrt(-at / slope))
+    return {"peak": float(np.sqrt(top)), "width": width}
+
+
+def hertz_line(code: str, elements: int, size: float) -> dict[str, float]:
+    """Seconds, and errors of the peak pressure and of the half-width."""
     model = Model(elements, size)
-    pressure, seconds = CODES[code](model)
+    pressure, seconds = (calculix if code == "CalculiX" else getfem)(model)
     pressure = FLATTER * pressure
     load = 2 * float(np.trapezoid(pressure, model.x))
     exact = model.scene.reference
     share = np.sqrt(load / abs(float(model.scene.upper.force["y"])))
     found = round_contact(model.x, pressure, exact.half_width * share)
-    errors = {
-        "peak": found["peak"] / (exact.peak * share) - 1,
-        "width": found["width"] / (exact.half_width * share) - 1,
-    }
-    return {"unknowns": model.block.p.size, "seconds": seconds} | errors
+    peak, width = exact.peak * share, exact.half_width * share
+    return {"cpu": seconds, "peak": found["peak"] / peak - 1, "width": found["width"] / width - 1}
+
+
+def hertz_point(points: int) -> dict[str, float]:
+    """The same of Tamaas, on the points of our half-space."""
+    known = point()
+    problem = reduce_bodies(half_space(known), elements=points).problem
+    places, a = problem.chart.places, known.exact.half_width
+    side = 2 * int(np.ceil(MARGIN * points)) * a / points
+    count = round(np.sqrt(problem.contacts))
+    given = {"gap": known.profile(places).reshape(count, count), "length": side}
+    given |= {"pressure": known.force / side**2, "modulus": contact_modulus(MATERIAL)}
+    found = in_python("TAMAAS", "python3", ["-c", TAMAAS], given)
+    read = round_contact(np.linalg.norm(places, axis=0), found["pressure"].ravel(), a)
+    errors = {"peak": read["peak"] / known.exact.peak - 1, "width": read["width"] / a - 1}
+    return {"cpu": float(found["seconds"])} | errors
+
+
+def peers() -> Iterator[dict[str, Any]]:
+    """The other codes on meshes or points that are ours."""
+    for code in ("CalculiX", "GetFEM", "Tamaas"):
+        for n in POINTS:
+            row: dict[str, Any] = {"scene": "Hertz, point" if code == "Tamaas" else "Hertz, line"}
+            row |= {"model": code, "mesh": n, "cpu": np.nan, "peak": np.nan, "width": np.nan}
+            try:
+                found = hertz_point(n) if code == "Tamaas" else hertz_line(code, n, LARGE)
+                yield row | found | {"end": "solved"}
+            except Exception as error:
+                yield row | {"end": str(error).partition(".")[0][:80]}
