@@ -1,8 +1,8 @@
 """What an accuracy takes, before anything is solved: degree, elements and tolerance.
 
 The error of a quantity on n elements across the half-width of contact, which grow away from it, is
-about CONSTANTS / n^2 at most. The constants are those of eight scenes with known answers, and the rule was
-judged by twenty others: `python -m experiments.questions.front` measures both (reports/front).
+about CONSTANTS / n^2 at most. The constants are those of eight scenes with known answers, and the
+rule was judged by twenty others: `python -m experiments.questions.front` measures both.
 """
 
 from __future__ import annotations

@@ -39,6 +39,7 @@ KEYS = ("scene", "model", "mesh", "tolerance", "reading")
 OTHERS: dict[str, Callable[[], list[Row]]] = {
     "regions": regions,
     "unseen": lambda: [row for case in unseen() for row in tried(case)],
+    "rule": lambda: judged(stored(NAME, "unseen")),
     "peers": lambda: list(peers()),
 }
 
@@ -67,7 +68,7 @@ def figures(made: dict[str, list[Row]]) -> dict[str, Any]:
 def report(made: dict[str, list[Row]]) -> None:
     """The report, whose numbers are those of the tables."""
     rule = made["rule"]
-    good = [row for row in rule if row["meets"] and row["ratio"] <= 2]
+    good = [row for row in rule if row["meets"] == "yes" and row["ratio"] <= 2]
     missed = [row for row in rule if row not in good]
     words = ", ".join(
         f"{row['scene']} ({row['quantity']}: {100 * row['rule error']:.2g} %,"
@@ -102,9 +103,8 @@ def main(names: list[str]) -> None:
     made = {name: stored(NAME, name) for name in (TABLE, *OTHERS)}
     if not all(made.values()):
         return
-    made |= {"front": front(made[TABLE]), "rule": judged(made["unseen"])}
-    for name in ("front", "rule"):
-        save(NAME, name, made[name])
+    made |= {"front": front(made[TABLE])}
+    save(NAME, "front", made["front"])
     if figures_alone():
         save_figures(NAME, figures(made))
     else:

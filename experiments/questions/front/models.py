@@ -113,7 +113,7 @@ def cattaneo() -> list[Model]:
     return [
         Model(name, "half-space", sheared_plane, POINTS),
         Model(name, "plane, linear", plain, LINEAR[2:]),
-        Model(name, "plane, quadratic", lambda: replace(own, degree=2), QUADRATIC[2:-1]),
+        Model(name, "plane, quadratic", lambda: replace(own, degree=2), (3, 4, 6, 8)),
         Model(name, "plane, small body", lambda: small, FEW, "body"),
         Model(name, "plane, associated", with_law(plain, "associated"), FEW, "law"),
         Model(name, "half-space, associated", with_law(sheared_plane, "associated"), FEW, "law"),
