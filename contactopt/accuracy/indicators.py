@@ -13,11 +13,12 @@ import numpy as np
 from contactopt.accuracy.estimate import read
 from contactopt.accuracy.marking import spread
 from contactopt.bodies.protocol import Body
+from contactopt.bodies.views import added_work, recovery_errors
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.states import duals_of
 from contactopt.errors import InputError
 from contactopt.readings.corners import infinite
-from contactopt.readings.quantities import Quantity, find_quantity
+from contactopt.readings.quantities import Quantity, elastic_energy, find_quantity
 from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
 
@@ -109,8 +110,8 @@ def element_errors(
         except InputError as error:
             log.info("%s: no adjoint, %s", quantity.name, error)
     fields = displaced if found is None else found
-    shares = [body.recovery_errors(U, U, W) for body, U, W in zip(bodies, displaced, fields)]
-    energy = sum(body.energy(U) for body, U in zip(bodies, displaced))
+    shares = [recovery_errors(body, U, U, W) for body, U, W in zip(bodies, displaced, fields)]
+    energy = elastic_energy(solved.reduction, solved.solution)
     missing = sum(own.sum() for own, _ in shares) / 2
     norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
     if quantity is None or found is None:
@@ -141,8 +142,8 @@ def _of_shape(
     for own in part.loads:
         if not own.boundary:
             load += own.density(origin, origin)[:, 0]
-    (work,) = body.added_work(volume, load, U, W)
-    (energy,) = body.added_work(volume, 0 * load, U, U)
+    (work,) = added_work(body, volume, load, U, W)
+    (energy,) = added_work(body, volume, 0 * load, U, U)
     return np.asarray(work - curved * energy)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.coupling.posed import Posed
-from contactopt.scenes.scene import HalfSpace, Scene
+from contactopt.scenes.scene import HalfSpace, Part, Scene
 
 # what the edge of contact is: it ends by itself, at a corner of a body, or nowhere;
 # degree of the displacement, 0 for a half-space without a mesh -> quantity -> error times n^2
@@ -97,7 +97,7 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
     bodies = [body.body for body in made.bodies if isinstance(body, AssembledElastic)]
     sizes = [float(np.ptp(body.locations, axis=1).min()) / width for body in bodies]
     size = min(sizes, default=np.inf)
-    flat = all(part.curve is None for part in scene.parts if part.meshed)
+    flat = all(part.curve is None for part in scene.parts if isinstance(part, Part))
     meshes = (1, 2) if scene.dim == 2 else ()
     found = propose(quantity, accuracy, edge, size, (0, *meshes) if flat else meshes)
     if found is None:

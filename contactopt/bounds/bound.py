@@ -65,6 +65,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import energy
 from contactopt.bounds.pressed_scene import PressedScene
 from contactopt.bounds.uneven_traction import uneven_traction
 from contactopt.errors import InputError
@@ -101,7 +102,7 @@ class Bound:
         self.joint = float(np.linalg.norm(uneven))
         both = 2 * float(uneven @ np.sqrt(np.maximum(squares, 0.0)))  # in each element norms add
         self.mesh = float(np.sqrt(self.size(left) ** 2 + both + self.joint**2))
-        energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]
+        energies = [energy(body, U, 0 * U) for body, U in zip(scene.bodies, displaced)]
         self.norm = float(np.sqrt(2 * sum(energies)))
         gaps = scene.work(scene.tractions[:, 0], self.displacement)
         slips = scene.slip_work(before) + scene.slip_work(added)

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.elements import FACES, Faces
@@ -25,7 +26,7 @@ from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.scene import Part, Scene
 
-ROLES = ("no use", "support", "load", "plate", "contact")
+ROLES = ("no use", "support", "load", "plate", "bolt", "contact")
 NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundary that stay legible
 
 
@@ -123,8 +124,8 @@ def _write(
         move="move" if scene.dim == 2 else "turn",
         followers="",
         arrows="loads, supports, and normals from the lower to the upper body,",
-        convention="A negative gap is an overlap. The arrow of a plate is its total force. A"
-        " support holds along the axis of its triangles, along all axes if they are full.",
+        convention="A negative gap is an overlap. The arrow of a plate or bolt is its total force."
+        " A support holds along the axis of its triangles, along all axes if they are full.",
         pairs="",
         cells=_rows(lines if roles is ROLES else [f" {text}" for text in lines]),
     )
@@ -199,7 +200,7 @@ def _spread(places: np.ndarray, many: int) -> np.ndarray:
 
 
 def _boundaries(
-    scene: Scene, part: Part, mesh: Any, planes: set[tuple[int, float]]
+    scene: Scene, part: Part, mesh: Mesh, planes: set[tuple[int, float]]
 ) -> Iterator[dict[str, Any]]:
     """The named boundaries of a body, what its loads are, and along which axes supports hold it. A
     boundary in a plane of symmetry, across which the body is shown whole, is hidden.
@@ -209,15 +210,18 @@ def _boundaries(
     loads = {load.boundary: load for load in part.loads}
     for name, item in _sides(mesh):
         load = loads.get(name)
-        role = (3 if load.level else 2) if load else 1 if name in held else 0
+        role = (4 if load.shared else 3 if load.level else 2) if load else 1 if name in held else 0
         if role == 0 and name in scene.surfaces_of(part):
             continue  # the pairs show it
         places, vector = item["places"], item["vector"]
         if load:
-            vector[:, : scene.dim] = load.density(*_normals(mesh, mesh.boundaries[name])).T
-        if load and load.level:
+            x, n = _normals(mesh, mesh.boundaries[name])
+            vector[:, : scene.dim] = load.density(x, n).T
+        if load and load.total:
             middle = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
-            vector[middle, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
+            mean = n.mean(axis=1) / np.linalg.norm(n.mean(axis=1))
+            vector[middle, : scene.dim] = load.resultant(scene.components, mean)
+            item["marked"] = np.arange(len(places)) == middle
         size = float(np.ptp(mesh.p, axis=1).max())
         if any(np.ptp(places[:, a]) <= 1e-9 * size >= abs(places[0, a] - x) for a, x in planes):
             item["hidden"] = True
@@ -242,7 +246,7 @@ def _boundaries(
             }
 
 
-def _normals(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _normals(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places of the nodes of facets, and outward normals there (dim, m), zero within edges."""
     corners = mesh.facets[:, facets]
     places = FACES[mesh.refdom.__name__][2][:, : len(corners)]
@@ -254,7 +258,7 @@ def _normals(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mesh.doflocs[:, nodes], sums[:, nodes] / np.where(length > 0, length, 1.0)
 
 
-def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+def _sides(mesh: Mesh) -> Iterator[tuple[str, dict[str, Any]]]:
     """The nodes of each named boundary, in space the triangles between them, and no arrows."""
     kind, faces = surface(*elements_of(mesh), _spatial(mesh.doflocs))
     for name, side in (mesh.boundaries or {}).items():
@@ -269,7 +273,7 @@ def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
         yield name, {"places": places, "cells": cells, "vector": vector, "marked": marked}
 
 
-def _faces_on(mesh: Any, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
+def _faces_on(mesh: Mesh, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
     """The faces of the surface of a solid (m, v) that are among some facets of its mesh."""
     shown, corners = np.sort(faces[:, : CORNERS[kind]], axis=1), mesh.facets[:, facets]
     wanted = np.sort(corners.T, axis=1)

@@ -16,8 +16,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.bodies.fields import Region
+from contactopt.bodies.views import stress_map
 from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import straight
@@ -59,7 +61,7 @@ def corner_remarks(reduction: Reduction, solution: Solution) -> list[str]:
 
 def at_re_entrant(reduction: Reduction, peak: Peak) -> bool:
     """Whether a peak of the stress lies at a re-entrant corner of its body."""
-    read = reduction.bodies[peak.body].stress_map(Region())
+    read = stress_map(reduction.bodies[peak.body], Region())
     if read is None:
         return False
     mesh = straight(read.mesh)
@@ -101,7 +103,7 @@ def _share(part: Any, scene: Any, place: np.ndarray, reach: float) -> float:
     return filled(cells, vertex) if away[vertex] <= reach else 0.5
 
 
-def re_entrant(mesh: Any, vertex: int) -> bool:
+def re_entrant(mesh: Mesh, vertex: int) -> bool:
     """Whether a vertex, or one within two elements of it, is at a re-entrant corner or edge. (The
     recovered stress at the corner itself may be less than that next to it.)
     """

@@ -25,6 +25,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from contactopt.bodies.fields import Region
+from contactopt.bodies.views import stress_map
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
@@ -214,7 +215,7 @@ def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tup
     of the displacement, or the derivative of that map by Poisson's ratio.
     """
     number = [part.name for part in reduction.scene.parts].index(place.owner)
-    recovered = reduction.bodies[number].stress_map(place.region, by_poisson)
+    recovered = stress_map(reduction.bodies[number], place.region, by_poisson)
     if recovered is None:
         raise InputError(
             f"quantity {place.name!r}: the stress inside body '{place.owner}' cannot be read here."

@@ -80,7 +80,7 @@ def _faint_loads(scene: Scene, part: Part) -> list[str]:
     for load in part.loads:
         if load.boundary:
             largest = max(map(abs, load.values(scene.components).values()), default=0.0)
-            own = largest / (area * depth * scene.copies) if load.level else largest
+            own = largest / (area * depth * scene.copies) if load.total else largest
             stress = max(stress, own)
     strain = stress / part.material.E
     if not 0 < strain < FAINT:

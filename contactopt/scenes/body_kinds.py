@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
@@ -42,6 +43,10 @@ class Support:
             dict.fromkeys(components, 0.0) if self.displacement is None else {**self.displacement}
         )
 
+    def address(self, body: str) -> tuple[str, ...]:
+        """As Load.address."""
+        return body, self.boundary
+
     def with_values(self, values: Mapping[str, float]) -> Support:
         """As Load.with_values."""
         return replace(self, displacement=dict(values))
@@ -62,7 +67,7 @@ class Part:
     """
 
     name: str
-    mesh: Any
+    mesh: Mesh
     material: Material
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()

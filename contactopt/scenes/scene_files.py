@@ -21,7 +21,7 @@ from contactopt.problem.laws import LAWS
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
-from contactopt.scenes.file_bodies import Reading, function_of, read_body
+from contactopt.scenes.file_bodies import Reading, bolted, function_of, read_body
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, library, read_materials
 from contactopt.scenes.scene import Scene, check_units
@@ -122,6 +122,7 @@ def _scene(
     if bodies is None or not bodies.data:
         raise top.fail("there are no bodies; add a table [bodies.NAME] for each.")
     parts = [read_body(bodies, name, reading) for name in bodies.data]
+    parts = bolted(top, parts, reading)
     if isinstance(top.data.get("contacts"), str):
         pairs = _found(top, parts, reading)
     else:
