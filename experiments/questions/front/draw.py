@@ -30,8 +30,8 @@ ASKED = {  # scene -> the quantity that is asked of it
     "press fit": "peak",
     "rough surface": "area",
 }
-SHORT = {"half-space": "½", "small body": "B", "associated": "A", "solid": "S"}
-SHORT |= {"linear": "L", "quadratic": "Q", "uniform": "U"}
+SHORT = {"half-space": "½", "small body": "B", "associated": "A", "mu = .3": "F"}
+SHORT |= {"solid": "S", "linear": "L", "quadratic": "Q", "uniform": "U", "Gauss": "G"}
 KINDS = ("model", "mesh", "reading", "tolerance")
 TOLD = ("half-space", "linear", "quadratic", "small body", "mu = .3", "uniform")
 
@@ -80,7 +80,7 @@ def letter(model: str) -> str:
 def draw_front(made: list[Row]) -> Any:
     """Seconds of the cheapest way to each accuracy, as a table of colours."""
     figure, (left, right) = paper_axes(columns=2, height=2.3)
-    scenes = list(ASKED)
+    scenes = [scene for scene in ASKED if any(row["scene"] == scene for row in made)]
     for ax, name in ((left, "all models"), (right, "meshes")):
         grid = np.full((len(scenes), len(ACCURACIES)), np.nan)
         for row in made:
@@ -179,9 +179,9 @@ def draw_rule(rows: list[Row]) -> Any:
                         textcoords="offset points")  # fmt: skip
     ax.axhline(1, color=GREY, lw=0.8)
     ax.axvline(2, color=GREY, lw=0.8)
-    right = max(4.0, 1.3 * max(row["ratio"] for row in rows))
-    ax.set(xlim=(0.7, right), xlabel="time over the best in hindsight [-]")
+    ratios = [row["ratio"] for row in rows]
+    ax.set(xlim=(0.7 * min(ratios), 2 * max(ratios)), xlabel="time over the best in hindsight [-]")
     ax.set(ylabel="error over the accuracy asked for [-]")
-    ax.set_xticks([1, 2, 4], ["1", "2", "4"])
+    ax.set_xticks([0.5, 1, 2, 4], ["1/2", "1", "2", "4"])
     ax.minorticks_off()
     return figure
