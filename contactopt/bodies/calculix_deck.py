@@ -87,6 +87,7 @@ def _check(scene: Scene) -> None:
                 f"body '{part.name}' has no mesh, and a deck of CalculiX needs one; make it a Part,"
                 " stiff where it is rigid."
             )
+    for part in scene.meshed.values():
         shape = part.build_mesh(scene.elements, scene.zone).refdom.__name__
         if scene.degree == 2 and shape not in ("RefTri", "RefTet"):
             raise InputError(
