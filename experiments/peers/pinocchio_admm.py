@@ -33,7 +33,7 @@ def prepare(problem, tol, settings):
         datas.append(models[-1].createData())
     name = settings["solver"]
     options = getattr(pin, name + "SolverSettings")()
-    options.max_iterations = 1000000
+    options.max_iterations = settings.get("iterations", 1000000)
     for kind in ("feasibility", "complementarity"):
         setattr(options, "absolute_" + kind + "_tol", tol)
         setattr(options, "relative_" + kind + "_tol", tol)

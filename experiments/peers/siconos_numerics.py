@@ -44,7 +44,7 @@ def prepare(problem, tol, settings):
     (k, dim), size, number = q.shape, q.size, len(columns)
     options = sn.SolverOptions(getattr(sn, f"SICONOS_FRICTION_{dim}D_" + settings["solver"]))
     options.dparam[sn.SICONOS_DPARAM_TOL] = tol
-    options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = 1000000
+    options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = settings.get("iterations", 1000000)
     if dim == 2:
         Q = np.zeros((k, k, 2, 2))
         Q[np.repeat(np.arange(k), np.diff(problem["indptr"])), columns] = blocks
