@@ -75,7 +75,7 @@ _HOMES = {
     "problem.transfer": "transfer",
     "runner": "Result run",
     "scenes.contact": "Contact",
-    "scenes.scene": "BodyForce HalfSpace Part Plate Pressure Rigid Scene Support Traction",
+    "scenes.scene": "BodyForce Bolt HalfSpace Part Plate Pressure Rigid Scene Support Traction",
     "simplification.findings": "Simplification Simplified",
     "simplification.search": "simplify",
     "solving.follow": "follow",

@@ -39,6 +39,7 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.accuracy.marking import divisible, finer, with_bent_edges
+from contactopt.bodies.views import energy
 from contactopt.cards import force_unit
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.errors import InputError, Unbalanced
@@ -104,8 +105,8 @@ def limit(
     ----------
     scene : as for contactopt.run
     load : which load grows, as BODY:BOUNDARY:COMPONENT, or all those that begin with BODY or
-        BODY:BOUNDARY; BODY:body_force and, of a body without a mesh, BODY:force. None: what the
-        last step of the load path changes
+        BODY:BOUNDARY; BODY:body_force, bolt:NAME and, of a body without a mesh, BODY:force. None:
+        what the last step of the load path changes
     note : receives progress messages
     changes : as for contactopt.run
 
@@ -142,15 +143,18 @@ def _rows(scene: Scene) -> dict[str, tuple[float, bool]]:
     found: dict[str, tuple[float, bool]] = {}
     for part in scene.parts:
         for load in getattr(part, "loads", ()):
-            own, place = load.values(scene.components), f"{part.name}:{_place(load)}"
-            found |= {f"{place}:{c}".rstrip(":"): (own[c], load.level) for c in own}
+            own, place = load.values(scene.components), _place(part, load)
+            found |= {f"{place}:{c}".rstrip(":"): (own[c], load.total) for c in own}
         whole = getattr(part, "force", None) or {}
         found |= {f"{part.name}:force:{c}": (whole[c], True) for c in whole}
     return found
 
 
-def _place(load: Load) -> str:
-    return load.boundary or "body_force"
+def _place(part: Any, load: Load) -> str:
+    """What stands before the component in the name of a load."""
+    if load.shared:
+        return ":".join(("bolt", *load.address(part.name)))
+    return f"{part.name}:{load.boundary or 'body_force'}"
 
 
 def _belongs(name: str, load: str) -> bool:
@@ -183,7 +187,7 @@ def _without(scene: Scene, load: str) -> Scene:
 
     def changed(part: Any) -> Any:
         if isinstance(part, Part):
-            loads = (eased(f"{part.name}:{_place(own)}", own) for own in part.loads)
+            loads = (eased(_place(part, own), own) for own in part.loads)
             return replace(part, loads=tuple(loads))
         return replace(part, force=part.force and left(f"{part.name}:force", part.force))
 
@@ -261,7 +265,9 @@ class _Push:
         if not np.abs(load).max(initial=0.0) > NOTHING * size:
             return None
         bodies = zip(base.bodies, loaded.bodies)
-        work = [2 * old.energy(new.at_rest - old.at_rest) for old, new in bodies]
+        work = [
+            2 * energy(old, moved := new.at_rest - old.at_rest, 0 * moved) for old, new in bodies
+        ]
         return cls(base.problem, (loaded.problem.q - base.problem.q).ravel(), load, sum(work))
 
     @property

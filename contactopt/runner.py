@@ -115,23 +115,36 @@ def run(
     ------
     InputError : with a sentence that says what to do; nothing is left half-written
     """
+    start = time.perf_counter()
     with overheard() as told, collected() as noted:
-        return _run(scene, out, note, changes, lambda: (*told, *noted))
+        file = _scene_file(scene, changes)
+        options, changes = choose(changes, {} if file is None else file.solve)
+        _check_output(out, options)
+        states = _states(scene, file, changes)
+        with _located(file):
+            return _run(states, out, note, options, lambda: (*told, *noted), start)
+
+
+@contextmanager
+def _located(file: SceneFile | None) -> Iterator[None]:
+    """Within this block errors name the scene file, and the line in it."""
+    try:
+        yield
+    except InputError as error:
+        if file is None:
+            raise
+        raise file.located(error) from error
 
 
 def _run(
-    scene: str | Path | Scene,
+    states: tuple[Scene, ...],
     out: str | Path | None,
     note: Note,
-    changes: dict[str, Any],
+    options: RunOptions,
     told: Callable[[], tuple[str, ...]],
+    start: float,
 ) -> Result:
     """As run(); `told` gives the remarks that were made so far outside of the solution."""
-    start = time.perf_counter()
-    file = _scene_file(scene, changes)
-    options, changes = choose(changes, {} if file is None else file.solve)
-    _check_output(out, options)
-    states = _states(scene, file, changes)
     of_meshes = said_of_meshes(states[-1])
     name = options.method or default_method(options.settings)
     method = find_method(name, **options.settings)
@@ -164,10 +177,6 @@ def _run(
     except KeyboardInterrupt:
         restart.stopped(note)
         raise
-    except InputError as error:
-        if file is None:
-            raise
-        raise file.located(error) from error
 
 
 def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:

@@ -154,6 +154,7 @@ def test_quantities_in_3d_agree_with_the_plane():
 # Refinement
 
 
+@pytest.mark.slow
 def test_refinement_meets_the_target_from_coarse_to_fine():
     scene = punch()
     rough, first = refine([scene], "approach", 3e-2)
@@ -227,6 +228,7 @@ def test_given_meshes_of_solids_are_divided_too():
     )
 
 
+@pytest.mark.slow
 def test_a_load_path_is_refined_as_a_whole():
     result = run("cattaneo-2d", steps=1, elements=16, accuracy=0.05, quantity="energy")
     assert result.path is not None and len(result.path.states) == 6

@@ -215,6 +215,7 @@ def reported(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     monkeypatch.chdir(reported)
     text = Path("reports/small/report.md").read_text()
@@ -257,6 +258,7 @@ def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
         ('findings = "mine.py"', 'findings = "yours.py"', "yours.py"),
     ],
 )
+@pytest.mark.slow
 def test_errors_of_a_report_name_the_figure(reported, monkeypatch, capsys, old, new, words):
     monkeypatch.chdir(reported)
     Path("wrong").mkdir(exist_ok=True)
@@ -294,6 +296,7 @@ def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch)
     assert all(file.stat().st_size < 1_000_000 for file in folder.iterdir())
 
 
+@pytest.mark.slow
 def test_a_figure_without_rows_is_left_out_with_a_sentence(reported, monkeypatch):
     monkeypatch.chdir(reported)
     Path("filtered").mkdir()

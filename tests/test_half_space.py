@@ -178,7 +178,7 @@ def test_operator_is_symmetric_positive_and_equal_to_its_entries(changes):
     assert np.linalg.eigvalsh(entries).min() > -1e-13
     np.testing.assert_allclose(Q.loosened(1e-3) @ x, entries @ x, atol=1e-5)
     by_bodies = sum(
-        B @ body.displacement(B.T @ x, 0 * body.resultants)
+        B @ body.displacement(B.T @ x, 0 * body.motions.resultants)
         for B, body in zip(reduction.maps, reduction.bodies)
     )
     np.testing.assert_allclose(by_bodies, entries @ x, atol=1e-12)

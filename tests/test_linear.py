@@ -445,6 +445,7 @@ def resident():
     return int(statm.read_text().split()[1]) * resource.getpagesize() / 2**20
 
 
+@pytest.mark.slow
 def test_factors_are_freed_whatever_thread_made_them():
     """SuperLU forgets its memory where another thread frees it: solvers made and dropped must not
     add up.
@@ -506,6 +507,7 @@ def test_threads_share_the_factors_of_pardiso():
         assert np.abs(A @ x - load).max() <= 1e-10 * np.abs(load).max()
 
 
+@pytest.mark.slow
 def test_memory_of_pardiso_is_given_back():
     pytest.importorskip("pypardiso")
     scene = scenes.flat_punch(3)

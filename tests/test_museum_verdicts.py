@@ -144,6 +144,7 @@ def node(p, tangential=1.0, **plate):
     return InterfaceProblem(coupled(p, tangential), [[p["q_n"], q_t]], p["mu"], **plate)
 
 
+@pytest.mark.slow
 @browser_needed
 def test_one_node(said):
     counts = []
@@ -156,6 +157,7 @@ def test_one_node(said):
     assert {1, 2, 3, np.inf} <= set(counts)
 
 
+@pytest.mark.slow
 @browser_needed
 def test_two_nodes(said):
     counts = set()
@@ -215,6 +217,7 @@ def test_stick_zone(said):
             assert verdict.startswith("The middle sticks") and 0 < a["c"] < a["a"], (p, verdict)
 
 
+@pytest.mark.slow
 @browser_needed
 def test_penalty(said):
     x = string(6)[1]

@@ -93,6 +93,7 @@ def test_a_cycle_closes_and_is_antisymmetric(cycle):
     np.testing.assert_allclose(h["shift"][9:16], -h["shift"][3:10], atol=2e-3 * h["shift"].max())
 
 
+@pytest.mark.slow
 def test_friction_work_is_the_area_of_the_loop():
     h = follow(sheared(steps=12, shear=45.0)).history
     force, shift, work = h["shear_force"][12:], h["shift"][12:], h["friction_work"][12:]
@@ -194,7 +195,7 @@ def test_units_do_not_matter():
     assert stiff["stick_half_width"] == pytest.approx(small["stick_half_width"], rel=1e-6)
 
 
-@pytest.mark.parametrize("simplices", [False, True])
+@pytest.mark.parametrize("simplices", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_quadratic_elements_follow_the_same_path(cycle, simplices):
     states = scenes.make_path(
         "cattaneo-2d", degree=2, simplices=simplices, steps=3, elements=10, shear=30.0

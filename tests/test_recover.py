@@ -6,6 +6,7 @@ import pytest
 from conftest import two_blocks
 
 from contactopt import reduce_bodies, run, scenes, solve
+from contactopt.bodies import views
 from contactopt.coupling.back_to_bodies import recover
 from contactopt.figures.pieces import outline
 from contactopt.meshes.cells import elements_of
@@ -119,7 +120,7 @@ def test_a_quadratic_displacement_is_kept_at_every_node(kind, cut, name, tmp_pat
     moved = np.array([(i + 1) * x[i] ** 2 + x[0] * x[1] for i in range(dim)])
     U = np.zeros(moved.size)
     U[body.body.unknowns] = moved
-    field = body.fields(U)
+    field = views.fields(body, U)
     assert field.displacement.shape == field.mesh.p.shape == x.shape
     assert np.allclose(field.mesh.p, x) and np.allclose(field.displacement, moved)
     gradient = np.zeros((3, 3, x.shape[1]))

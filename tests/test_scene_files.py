@@ -287,6 +287,11 @@ MISTAKES = [
     ),
     ("block = { x = [0, 2], y", "move = { x = 1e16 }\nblock = { x = [0, 2], y", 5, "moved so far"),
     ("[solve]", "[solv]", 20, "there is no 'solv'"),
+    ("mu = 0.4", "mu = [0.3, 0.2]", 15, "'block-floor': .* one number or one per contact"),
+    ("mu = 0.4", 'mu = 0.4\ncoupling = "rope"', 15, "'block-floor': unknown coupling 'rope'"),
+    ("tol = 1e-10", 'method = "newtn"', 21, "unknown method 'newtn'"),
+    ("thickness = 2.0", 'units = { length = "mm", stress = "mpa" }', 2, "did you mean 'MPa'"),
+    ("thickness = 2.0", 'steps = ["press", "press"]', 2, "a name of its own; got 'press'"),
 ]
 
 

@@ -24,6 +24,7 @@ from contactopt import (
     scenes,
     simplify,
 )
+from contactopt.bodies import views
 from contactopt.bodies.fields import Region
 from contactopt.meshes.polar import ring
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
@@ -294,7 +295,7 @@ def test_stress_at_the_plane_is_that_of_the_whole():
                     each.reduction.bodies[number],
                     each.reduction.displaced(each.solution)[number],
                 )
-                made, recovered = body.fields(U), body.stress_map(Region())
+                made, recovered = views.fields(body, U), views.stress_map(body, Region())
                 plane, there = (np.abs(x[0] - 3.0) < 1e-9 for x in (made.mesh.p, recovered.places))
                 fields.append(made.stress[plane][np.argsort(made.mesh.p[1, plane])])
                 stresses.append(recovered.stress(U)[there][np.argsort(recovered.places[1, there])])

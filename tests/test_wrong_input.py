@@ -3,6 +3,7 @@ once gave.
 """
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -232,6 +233,12 @@ def test_a_body_that_is_held_everywhere_is_refused():
 def test_choices_that_there_are_not(choice):
     with pytest.raises(InputError):
         reduce(flat_punch(2, elements=4), **choice)
+
+
+@pytest.mark.parametrize("units", ["mpa", ("mm", "mpa"), ("MM", "MPa"), ("mm", " "), ("mm", 3)])
+def test_units_are_two_names(units):
+    with pytest.raises(InputError, match="unit"):
+        replace(flat_punch(2, elements=4), units=units)
 
 
 def test_a_path_of_other_meshes_is_refused():

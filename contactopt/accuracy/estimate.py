@@ -15,17 +15,13 @@ from contactopt.solving.solve_scene import Solved
 class Level:
     """What one solve of the search gave.
 
-    unknowns     of the displacement;   contacts  of the interface problem
-    value        of the quantity [its unit];   uncertainty  of its reading [its unit]
-    error        estimated, over the value [-]; None where one mesh says nothing
-    seconds      wall time since the search began [s]
-    energy_error estimated error of the displacement in the energy norm, over its norm [-]; 0 where
-    it is not estimated
-    place, size  of a largest value: where it was read (dim,), and the size of the elements there
-                 [length]
-    elements     across the contact half-width;   splits  how often the mesh was halved everywhere
-    rounds       of the zone loop;   zone  half-width that the mesh resolves [length]; None without
-                 a zone loop
+    unknowns of the displacement; contacts of the interface problem value of the quantity;
+    uncertainty of its reading [its unit] error estimated, over the value [-]; None where one mesh
+    says nothing seconds wall time since the search began [s] energy_error estimated, in the energy
+    norm [-]; 0 where it is not estimated place, size of a largest value: where it was read, and the
+    size of the elements there [length] elements across the contact half-width; splits how often the
+    mesh was halved everywhere rounds of the zone loop; zone half-width that the mesh resolves
+    [length], if any
     """
 
     unknowns: int
@@ -54,19 +50,14 @@ class Level:
 class Estimate:
     """What is known of a quantity after the last solve.
 
-    value           on the last mesh [unit of the quantity]
-    extrapolated    the value with its estimated error added; None where the error is unknown
-    error           estimated error over the value [-], with that of the geometry; None where it is
-                    unknown
-    mesh_error      signed part of it that falls with the size of the elements [-]
-    grading_error   signed part of it that falls with the size of the elements away from the contact
-                    [-]
-    geometry_error  part of it that no refinement removes, because the meshes do not tell the shape
-                    of a boundary, or because curved surfaces overlap as they are drawn [-]
-    order           observed order of convergence; None if it was not observed
-    guarantee       what of the error is not estimated but bounded; None if that was not asked for
-    reached         whether the error is at most the target
-    message         one sentence that says how the search ended
+    value           on the last mesh;   extrapolated  the same with its estimated error added
+    error           estimated over the value [-], with that of the geometry; None: unknown
+    mesh_error      signed part that falls with the size of the elements [-];   grading_error  with
+                    their size away from the contact [-]
+    geometry_error  part that no refinement removes: the shape is not known, or surfaces overlap [-]
+    order           observed order of convergence, if any
+    guarantee       what is not estimated but bounded, where that was asked for
+    reached         whether the error is at most the target;   message  how the search ended
     levels          all solves, in their order
     """
 

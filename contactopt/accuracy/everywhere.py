@@ -68,14 +68,12 @@ def believed(best: float, meshes: int) -> float:
 
 
 def remainder(before: float | None, last: float, best: float) -> tuple[float, float | None]:
-    """Estimate the sum of all further differences of a sequence under further halving of the mesh
-    from its last two, `before` None where there is only one, with the sign of the last one; and the
-    observed order, None if it is unknown.
+    """Estimate the sum of all further differences of a sequence under halving of the mesh from its
+    last two, `before` None where there is one; and the observed order, if any.
 
-    The order is log2(before / last), held between SLOWEST and `best`, and the remaining differences
-    form a geometric series. A small last difference may be luck, so that the result is at least
-    what order `best` leaves of the difference before. Where the two differences have opposite
-    signs, the result is as large as the last one, or a quarter of the one before.
+    The order log2(before / last) is held between SLOWEST and `best`; the remaining differences form
+    a geometric series, at least what order `best` leaves of the difference before, since a small
+    one may be luck. After a change of sign: the last one, or a quarter of the one before.
     """
     order = None
     size = max(abs(last), abs(before or 0.0) / 2**best) / (2**best - 1)
@@ -113,10 +111,8 @@ class Everywhere:
     """The nested solves of scenes whose parts make their own meshes.
 
     watches  whether the largest peak may exceed its value by what it changed, as others may
-
-    values   (elements, splits) -> value;   changes  changes[i] is the change of the value by split
-             i + 1. There is one entry for every split of the present mesh; without one there is
-             still the first, measured to learn what it does
+    values   (elements, splits) -> value;   changes[i]  of the value by split i + 1, one for each
+             split of the present mesh; without one still the first
     """
 
     watches = False

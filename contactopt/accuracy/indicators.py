@@ -13,11 +13,12 @@ import numpy as np
 from contactopt.accuracy.estimate import read
 from contactopt.accuracy.marking import spread
 from contactopt.bodies.protocol import Body
+from contactopt.bodies.views import added_work, recovery_errors
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.states import duals_of
 from contactopt.errors import InputError
 from contactopt.readings.corners import infinite
-from contactopt.readings.quantities import Quantity, find_quantity
+from contactopt.readings.quantities import Quantity, elastic_energy, find_quantity
 from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
 
@@ -71,9 +72,9 @@ class ElementErrors:
 
 
 def misfit(found: Sequence[ElementErrors]) -> float:
-    """By how much the last two refinements changed the value with its estimated error added, which
-    exact estimates would leave as it is [unit of the quantity]; `found` belong to the last three
-    meshes. The change of the earlier refinement falls with the estimated error since.
+    """By how much the last two refinements changed the value with its estimated error, which exact
+    estimates would not [its unit]; `found` belong to the last three meshes. The earlier change
+    counts less, as the estimated error has fallen since.
     """
     changes = np.abs(np.diff([errors.value + errors.total for errors in found]))
     if len(changes) > 1:
@@ -87,22 +88,18 @@ def element_errors(
     value: float,
     volumes: Sequence[np.ndarray] = (),
 ) -> ElementErrors:
-    """What each element adds to the error of a quantity with this value, estimated as in
-    contactopt.accuracy.
+    """What each element adds to the error of a quantity with this value, as in contactopt.accuracy.
 
     The energy J(U) = a(U, U) / 2 is quadratic. With the error e = U - U_h and its slope at U_h,
 
         J - J_h = a(U_h, e) + a(e, e) / 2 = a(U, e) - a(e, e) / 2,
 
-    and a(U, e) is a(W - W_h, e) with the adjoint W. Under loads alone W is U, so that the energy is
-    too small by that of the error; where displacements or an interference are given W is zero, so
-    that it is too large by as much.
+    and a(U, e) is a(W - W_h, e) with the adjoint W: U under loads alone, zero where displacements
+    or an interference are given. `volumes` (elements,) of each body lie between straight facets and
+    their curves [length^dim].
 
-    `volumes` (elements,) of each body lie between straight facets and the curves for which they
-    stand [length^dim]; what they would add is part of the error.
-
-    For edges, for no quantity at all, and where the adjoint problem has no solution, the energy of
-    the error serves as a guide to the marking alone, without a sign.
+    For edges, for no quantity, and where the adjoint has no solution, the energy of the error
+    guides the marking alone, without a sign.
     """
     state = State(solved.reduction, solved.solution)
     bodies, displaced, found = solved.reduction.bodies, state.displaced, None
@@ -113,8 +110,8 @@ def element_errors(
         except InputError as error:
             log.info("%s: no adjoint, %s", quantity.name, error)
     fields = displaced if found is None else found
-    shares = [body.recovery_errors(U, U, W) for body, U, W in zip(bodies, displaced, fields)]
-    energy = sum(body.energy(U) for body, U in zip(bodies, displaced))
+    shares = [recovery_errors(body, U, U, W) for body, U, W in zip(bodies, displaced, fields)]
+    energy = elastic_energy(solved.reduction, solved.solution)
     missing = sum(own.sum() for own, _ in shares) / 2
     norm = float(np.sqrt(missing / energy)) if energy > 0 else 0.0
     if quantity is None or found is None:
@@ -145,18 +142,15 @@ def _of_shape(
     for own in part.loads:
         if not own.boundary:
             load += own.density(origin, origin)[:, 0]
-    (work,) = body.added_work(volume, load, U, W)
-    (energy,) = body.added_work(volume, 0 * load, U, U)
+    (work,) = added_work(body, volume, load, U, W)
+    (energy,) = added_work(body, volume, 0 * load, U, U)
     return np.asarray(work - curved * energy)
 
 
 def read_once(solved: Solved, name: str) -> dict[str, Any]:
-    """Read a quantity from a solution: its "value", its relative "error", None where one mesh says
-    nothing of it, and a "message" where it is infinite or missing. InputError if the scene does not
-    have it.
-
-    For a load path it is the error of the last state, after the slip that the states before it
-    found on this mesh.
+    """Read a quantity from one solution: its "value", its relative "error", None where one mesh
+    says nothing, and a "message" where it is infinite or missing. A load path counts by its last
+    state.
     """
     quantity = find_quantity(name, solved.reduction.scene)
     reading = read(quantity, solved)
@@ -176,12 +170,9 @@ def read_once(solved: Solved, name: str) -> dict[str, Any]:
 def along_path(
     solved: Solved, quantity: Quantity, value: float, volumes: Sequence[np.ndarray] = ()
 ) -> ElementErrors:
-    """What each element adds to the error of a quantity of a scene, or of a load path, with the
-    `volumes` of element_errors.
-
-    Friction remembers the slip of earlier states, so that their errors matter at the end of a path
-    as well. No adjoint goes back over its steps: the elements are marked by the energy of the error
-    of every state, in which the largest one counts for all.
+    """As element_errors, for a load path as well. Friction remembers the slip of earlier states,
+    and no adjoint goes back over them: elements are marked by the largest energy of the error of
+    all states.
     """
     if solved.path is None:
         return element_errors(solved, quantity, value, volumes)
@@ -202,10 +193,8 @@ def _state(solved: Solved, number: int) -> Solved:
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What elements at the contact add to the error of a function of the forces, because the
-    pressure varies between contacts. `weights` (k,) are its derivatives by the normal forces.
-    Returned are (elements,), signed, for each body; elements that hold the nodes of a contact share
-    what it adds.
+    """What elements (elements,) at the contact add to the error of a function of the forces with
+    the derivatives `weights` (k,), because the pressure varies between contacts.
     """
     reduction, problem = solved.reduction, solved.reduction.problem
     added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
@@ -219,11 +208,10 @@ def pressure_errors(reduction: Reduction, forces: np.ndarray) -> np.ndarray:
     """By how much the pressure at each contact exceeds the force over the area there, (k,)
     [stress].
 
-    The force at a contact is the integral of the pressure with a hat function: over the area of the
-    hat it is a mean of the pressure nearby. On a line with contacts at distance h that mean is p +
-    h^2 p'' / 12. The mean of the piecewise linear function through the contacts is p + h^2 p'' / 6
-    as its second differences are h^2 p''. Half of what it differs from the value is the error, and
-    this half is taken on surfaces and where distances vary as well.
+    The force is the integral with a hat function. At a distance h on a line its mean is p + h^2 p''
+    / 12, and that of the piecewise linear function through the contacts p + h^2 p'' / 6 as its
+    second differences are h^2 p'': half of what this differs from the value is the error, taken on
+    surfaces and for varying distances as well.
     """
     problem = reduction.problem
     errors, areas = np.zeros(len(forces)), problem.areas

@@ -48,17 +48,15 @@ def refine(
     adaptive: bool = False,
     bound: bool = False,
 ) -> tuple[Solved, Estimate]:
-    """Solve a scene, or a load path of several states, on meshes just fine enough for the relative
-    `accuracy` of one quantity, and estimate its error. InputError, before anything is solved, for a
-    quantity that the scene does not have and an accuracy out of range, and where the first mesh has
-    no solution.
+    """Solve a scene, or the states of a load path, on meshes just fine enough for the relative
+    `accuracy` of a quantity, and estimate its error. InputError, before anything is solved, for a
+    quantity that the scene does not have.
 
-    Meshes are refined everywhere, or with `adaptive` where the quantity needs it, each body by
-    itself; a mortar coupling joins what no longer matches, and quadrilaterals and hexahedra become
-    triangles and tetrahedra. Each solve begins with the last answer. The search ends short of the
-    target, with a sentence in the estimate and with the best answer, where the quantity does not
-    converge or does not exist, where the next mesh would pass a limit, and where a solve or a
-    refinement fails. With `bound` it ends with a guaranteed bound (contactopt.bounds).
+    Meshes are refined everywhere, or with `adaptive` where the quantity needs it: simplices then,
+    and mortar joins what no longer matches. Each solve begins with the last answer. The search ends
+    short of the target, with a sentence and the best answer, where the quantity does not converge
+    or exist, at a limit, and where a solve or refinement fails. With `bound` it ends with a
+    guaranteed bound.
     """
     check_number("the accuracy", accuracy, low=0.0, high=1.0)
     scene = states[-1]
@@ -78,10 +76,8 @@ def refine(
 
 
 def _in_time(options: Options, accuracy: float) -> Options:
-    """Options with which solvers stop once their residual is a tenth of the accuracy, and small
-    enough for derivatives, unless another tolerance is asked for.
-
-    The residual is part of the estimated error of each mesh.
+    """Options with which solvers stop at a tenth of the accuracy, small enough for derivatives,
+    unless another tolerance is asked for.
     """
     if options.tol != TOL:
         return options
@@ -185,11 +181,9 @@ class _Loop:
     def _rivals(self) -> tuple[list[Peak], float]:
         """The local maxima that may be the largest, and by how much they may exceed the value.
 
-        The largest is among them until smaller elements around it have changed it little; where
-        all elements are divided, the differences of nested solutions tell more. The search judges
-        what the value changed; what the peak changed beyond that counts here. Another may grow by
-        as much again as it did on smaller elements. One that has fallen is not expected to, but may
-        swing back as differences of nested solutions do (contactopt.accuracy.everywhere).
+        The largest is one until smaller elements changed it little: what it changed beyond the
+        value counts. Another may grow by as much again as it did, or swing back if it fell, as
+        differences of nested solutions do.
         """
         last = self.peaks[-1]
         found, excess = [], 0.0
@@ -208,10 +202,7 @@ class _Loop:
 
     def _before(self, peak: Peak) -> tuple[float, float]:
         """The value of a peak, and the largest value, on the last mesh of larger elements there;
-        where there is none, a share of its value, and its value.
-
-        What nodes scatter about a fit is no measure here: where facets change their length, it is
-        large on every mesh.
+        else a share of its value. (What nodes scatter about a fit is large on every mesh.)
         """
         for earlier in reversed(self.peaks[:-1]):
             away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]

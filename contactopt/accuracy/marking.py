@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from contactopt.accuracy.polygon import other_polygon
+from contactopt.bodies.views import on_elements
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
@@ -18,6 +19,7 @@ from contactopt.meshes.given_curves import Curve
 from contactopt.meshes.mesh_refinement import Function, bent, divide, facets_of, slivers, split
 from contactopt.meshes.structured import simplices
 from contactopt.readings.peaks import Peak
+from contactopt.scenes.body_kinds import Body
 from contactopt.scenes.refined_scenes import part_curves
 from contactopt.scenes.scene import Part, Scene
 
@@ -52,24 +54,20 @@ class Shapes:
         """Whether a guess may be wrong."""
         return any(other is not None for own in self.guessed.values() for other in own.values())
 
-    def of(self, part: Any) -> Mapping[str, Curve]:
+    def of(self, part: Body) -> Mapping[str, Curve]:
         return self.curves.get(part.name, {})
 
 
 def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
-    """Put a scene, whose mesh functions make coarse first meshes, on meshes of straight elements,
-    and find the curves of their boundaries; with `simplicial` quadrilaterals and hexahedra are cut
-    into triangles and tetrahedra.
-
-    A boundary follows the `curve` of its part or the edges of second order of its file. Without
-    them the curve is a guess, the smooth outline through the nodes of the first mesh
-    (contactopt.meshes.curves).
+    """Put a scene on meshes of straight elements, with `simplicial` of simplices, and find the
+    curves of their boundaries: those of its parts or files, else the smooth outline of the first
+    mesh as a guess.
     """
     curves: dict[str, dict[str, Curve]] = {}
     guessed: dict[str, dict[str, Function | None]] = {}
 
-    def prepared(part: Any) -> Any:
-        if not hasattr(part, "build_mesh"):
+    def prepared(part: Body) -> Body:
+        if not isinstance(part, Part):
             return part
         given = part.build_mesh(FIRST, scene.zone)
         cut = simplices(given) if simplicial else straight(given)
@@ -92,7 +90,7 @@ def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
 
 
-def left_out(part: Any, shapes: Shapes) -> np.ndarray:
+def left_out(part: Body, shapes: Shapes) -> np.ndarray:
     """The volumes (elements,) between the straight facets of a body and its curves; (0,) for a body
     without a mesh, and zeros where edges follow the curves.
     """
@@ -122,11 +120,8 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
 
 
 def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
-    """The scene with the marked elements of every body divided; with all of them where nothing is
-    said.
-
-    Facets that face much finer ones of another body are divided with them (`balanced`), until none
-    is left.
+    """The scene with the marked elements of every body divided (None: all), and facets that face
+    much finer ones with them (`balanced`), until none is left.
     """
     if marked is None:
         return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
@@ -140,8 +135,8 @@ def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -
     return scene
 
 
-def _divided(part: Any, chosen: Mapping[str, np.ndarray], shapes: Shapes) -> Any:
-    if part.name not in chosen:
+def _divided(part: Body, chosen: Mapping[str, np.ndarray], shapes: Shapes) -> Body:
+    if not isinstance(part, Part) or part.name not in chosen:
         return part
     return replace(part, mesh=divide(part.mesh, chosen[part.name], shapes.of(part)))
 
@@ -162,11 +157,8 @@ def unknowns(scene: Scene) -> int:
 
 
 def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Mark more elements of meshes of simplices, for each body beside those that are marked, so
-    that surfaces that face each other stay about as fine as each other.
-
-    A surface that is much finer than the one that it touches sees the facets of the other one as a
-    polygon, whose corners press with a pressure that grows with every refinement of the fine side.
+    """Mark more elements so that surfaces that face each other stay about as fine: a much finer one
+    sees the other as a polygon, whose corners press ever harder.
     """
     chosen = [set(elements.tolist()) for elements in marked]
     names = [part.name for part in scene.parts]
@@ -212,15 +204,13 @@ def spread(reduction: Reduction, weights: np.ndarray) -> list[np.ndarray]:
     nodes they hold.
     """
     parts = zip(reduction.bodies, reduction.maps)
-    return [body.on_elements(np.asarray(abs(B).T @ weights.ravel())) for body, B in parts]
+    return [on_elements(body, np.asarray(abs(B).T @ weights.ravel())) for body, B in parts]
 
 
 def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -> np.ndarray:
-    """Numbers of the contacts that press at least as much as the least of some peaks on their own
-    pair of surfaces.
-
-    Where many peaks come close to the largest one, the pressure is nearly even: its surface is then
-    divided as one, since facets of different lengths would make peaks of their own.
+    """Contacts that press at least as much as the least of some peaks on their own pair. Where many
+    peaks come close to the largest one, the surface is divided as one, since facets of different
+    lengths would make peaks of their own.
     """
     least = np.full(len(pressure), np.inf)
     for pair in reduction.problem.pairs:
@@ -231,12 +221,9 @@ def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -
 
 
 def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """Find the contacts between which the gap of a rigid body is smaller than at the contacts,
-    where `touching` (k,) touch and the surfaces are `apart` (k,) [length].
-
-    Gap functions are sampled within every facet. Counted is where the sample undercuts what the
-    facet has between its nodes by more than the surfaces are apart there and CLOSURE of the
-    closure. Returned are the contacts at the corners of such facets.
+    """The contacts between which the gap of a rigid body, sampled within every facet, undercuts
+    what the facet has between its nodes by more than the surfaces are `apart` (k,) [length] and
+    CLOSURE of the closure, which those `touching` (k,) show.
     """
     scene, problem = reduction.scene, reduction.problem
     found = [np.empty(0, dtype=int)]

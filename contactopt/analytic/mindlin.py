@@ -142,11 +142,9 @@ def cycle_loss_point(
 
 
 def masing_branches(loads: Sequence[float]) -> list[tuple[float, float]]:
-    """The part of a history of loads, oldest first, that still counts by Masing's rules: for each
-    branch the change of the load along it, and 1 on the first loading or 2 after a reversal.
-
-    A loop that is closed is forgotten, and so is everything once the load passes its largest size
-    so far.
+    """The part of a history of loads that still counts by Masing's rules: for each branch the
+    change of the load along it, and 1 on the first loading or 2 after a reversal. Closed loops are
+    forgotten.
     """
     points = [0.0]
     for load in loads:

@@ -32,10 +32,8 @@ LEFT = ORDER // 2  # nodes of the central panel at v < 0
 
 
 def _panel_edges(b: float) -> np.ndarray:
-    """Right ends of the panels, less b: equal panels from the centre, refined on both sides of b,
-    ended at TAIL.
-
-    The first panel is central: it reaches as far to the left of v = 0 as to its right.
+    """Right ends of the panels, less b: equal ones from the centre, whose first reaches as far to
+    its left, refined on both sides of b, ended at TAIL.
     """
     scale = min(b, 1.0)
     inward = [SMALLEST * scale]
@@ -231,9 +229,8 @@ def _fold(full: np.ndarray, parity: int) -> np.ndarray:
 
 
 def _cauchy_moments(x: np.ndarray) -> np.ndarray:
-    """int_-1^1 P_m(t) / (x - t) dt = 2 Q_m(x), (k, ORDER); the principal value inside.
-
-    Source: DLMF 14.12.13.
+    """int_-1^1 P_m(t) / (x - t) dt = 2 Q_m(x), (k, ORDER), DLMF 14.12.13; the principal value
+    inside.
     """
     return np.where(_away(x), _by_quadrature(x, log=False), 2 * _second_kind(x)[:, :ORDER])
 

@@ -64,9 +64,8 @@ class UnitPunch:
 
     @cached_property
     def _history(self) -> tuple[np.ndarray, np.ndarray]:
-        """int_v^inf of p / x^2 and q / x^2, dx; in the central panel without their poles.
-
-        Last entry: from 0.
+        """int_v^inf of p / x^2 and q / x^2, dx, the last from 0; in the central panel without their
+        poles.
         """
         v, central = self.panels.v, np.arange(len(self.p)) < LEFT
         p0, slope = (value * central for value in self.centre)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import Body
+from contactopt.bodies.protocol import Body, FreeMotions
 from contactopt.errors import InputError
 
 if TYPE_CHECKING:
@@ -203,24 +203,27 @@ class UndividedBody(AssembledBody, Body):
     """A body without a linear system, so that it is both stages, which moves freely as a whole in
     the components of its part that have a total force. In the others it is moved as given.
 
-    whole  (dim,) numbers of the unknowns that are its motion as a whole
+    whole   (dim,) numbers of the unknowns that are its motion as a whole
+    fields  (n, p) displacements of its free motions
     """
 
     part: Any
     components: tuple[str, ...]
     whole: range
+    if TYPE_CHECKING:
+
+        @property
+        def fields(self) -> np.ndarray: ...
 
     @cached_property
     def name(self) -> str:
         return str(self.part.name)
 
     @cached_property
-    def motion_names(self) -> tuple[str, ...]:
-        return tuple(f"translation along {name}" for name in self.part.force or {})
-
-    @cached_property
-    def resultants(self) -> np.ndarray:
-        return np.array(list((self.part.force or {}).values()), dtype=float)
+    def motions(self) -> FreeMotions:
+        force = self.part.force or {}
+        names = tuple(f"translation along {name}" for name in force)
+        return FreeMotions(self.fields, names, np.array(list(force.values()), dtype=float))
 
     @property
     def given(self) -> np.ndarray:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,13 +14,15 @@ import skfem
 from contactopt.bodies.elements import Trace, Weight, node_unknowns
 from contactopt.bodies.motions import Motions
 from contactopt.bodies.stiffness import isotropic_stiffness
+from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.kinds import Kind
+from contactopt.scenes.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
-class Assembly:
-    """A discretised Part with n displacement unknowns, of which those in `free` are not prescribed.
+class Matrices:
+    """A body of n displacement unknowns as matrices; those in `free` are not prescribed.
 
     A              (n, n) sparse stiffness; singular on the free unknowns if there are free motions
     load           (n,) nodal forces of tractions and body forces
@@ -27,29 +30,83 @@ class Assembly:
     motion         (n, p) unit motions of the p plate components that may move, zero on free
                    unknowns
     plate_forces   (p,) total forces on them;   driven  what each column of `motion` is
-    traces         name of each candidate contact boundary -> trace of the displacement there
     rigid_motions  rigid motions that no support and no plate holds
     holders        name of each support and plate -> the unknowns that it holds or drives, each
                    unknown with one of them
-    mirrored       (dim, n / dim) nodes in planes across an axis beyond which the body goes on as
-                   its mirror image
+    reload         function (body, scene, part) -> the body with the loads of another scene;
+                   InputError if other unknowns are held or driven
+    unknowns       (dim, nodes) those of every node;   locations  (dim, nodes) its coordinates
+    surface_nodes  (m,) all nodes of the contact boundaries
     """
 
     name: str
-    kind: Kind
-    material: Material
-    basis: skfem.CellBasis
-    weight: Weight
     A: sp.csr_matrix
     load: np.ndarray
     prescribed: np.ndarray
     free: np.ndarray
     motion: np.ndarray
     plate_forces: np.ndarray
-    traces: Mapping[str, Trace]
     rigid_motions: Motions
     driven: tuple[str, ...]
     holders: Mapping[str, np.ndarray]
+    reload: Callable[[Any, Scene, Any], Any]
+
+    if TYPE_CHECKING:  # for classes whose fields they are, and for those that compute them
+
+        @property
+        def unknowns(self) -> np.ndarray: ...
+        @property
+        def locations(self) -> np.ndarray: ...
+        @property
+        def surface_nodes(self) -> np.ndarray: ...
+
+    @property
+    def contact_dofs(self) -> np.ndarray:
+        """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
+        return np.asarray(self.unknowns[:, self.surface_nodes].T)
+
+    def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
+        """The derivative (n,) of the elastic forces by 'E' or 'nu' at fixed U."""
+        raise InputError(
+            f"body '{self.name}' is given by its matrices, which have no material constants to"
+            " differentiate by; make it a Part with a mesh and a material."
+        )
+
+    def carried(self, component: int) -> np.ndarray:
+        """Weights (n,) of the displacements that give the motion along a component: that of the
+        plates that move along it; else of the supports that move along it; else, where nothing
+        holds the body along it, the mean displacement.
+        """
+        own, n = self.unknowns[component], len(self.load)
+        moving = [column for column in self.motion.T if column[own].any()]
+        if not moving:
+            driven = np.zeros(n)
+            driven[own] = self.prescribed[own] != 0
+            supports = [own for name, own in self.holders.items() if name.startswith("support")]
+            parts = [np.bincount(own, driven[own], n) for own in supports]
+            moving = [part for part in parts if part.any()]
+        if moving:
+            return np.asarray(sum(column / column.sum() for column in moving) / len(moving))
+        fields, forces = self.rigid_motions.fields, self.rigid_motions.forces
+        others = np.delete(np.arange(n), own)
+        free = np.all(fields[own] == 1.0, axis=0) & ~np.any(fields[others], axis=0)
+        return np.asarray(forces[:, free].sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly(Matrices):
+    """A discretised Part: matrices with the finite elements behind them.
+
+    traces    name of each candidate contact boundary -> trace of the displacement there
+    mirrored  (dim, n / dim) nodes in planes across an axis beyond which the body goes on as its
+              mirror image
+    """
+
+    kind: Kind
+    material: Material
+    basis: skfem.CellBasis
+    weight: Weight
+    traces: Mapping[str, Trace]
     mirrored: np.ndarray
 
     @property
@@ -78,7 +135,6 @@ class Assembly:
         return isotropic_stiffness(self.basis, constants, self.weight)
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
-        """The derivative (n,) of the elastic forces by 'E' or 'nu' at fixed U."""
         return np.asarray(self.A @ U / self.material.E if constant == "E" else self.by_poisson @ U)
 
     @property
@@ -95,28 +151,3 @@ class Assembly:
     def surface_nodes(self) -> np.ndarray:
         """All nodes of the contact boundaries, (m,)."""
         return np.unique(np.concatenate([trace.weights.indices for trace in self.traces.values()]))
-
-    @property
-    def contact_dofs(self) -> np.ndarray:
-        """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
-        return np.asarray(self.unknowns[:, self.surface_nodes].T)
-
-    def carried(self, component: int) -> np.ndarray:
-        """Weights (n,) of the displacements that give the motion along a component: that of the
-        plates that move along it; else of the supports that move along it; else, where nothing
-        holds the body along it, the mean displacement.
-        """
-        own, n = self.unknowns[component], len(self.load)
-        moving = [column for column in self.motion.T if column[own].any()]
-        if not moving:
-            driven = np.zeros(n)
-            driven[own] = self.prescribed[own] != 0
-            supports = [own for name, own in self.holders.items() if name.startswith("support")]
-            parts = [np.bincount(own, driven[own], n) for own in supports]
-            moving = [part for part in parts if part.any()]
-        if moving:
-            return np.asarray(sum(column / column.sum() for column in moving) / len(moving))
-        fields, forces = self.rigid_motions.fields, self.rigid_motions.forces
-        others = np.delete(np.arange(n), own)
-        free = np.all(fields[own] == 1.0, axis=0) & ~np.any(fields[others], axis=0)
-        return np.asarray(forces[:, free].sum(axis=1))

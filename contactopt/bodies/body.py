@@ -8,10 +8,11 @@ are those of the whole body.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import reduce
 
 import numpy as np
 import skfem
+from skfem import Mesh
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
@@ -19,6 +20,7 @@ from contactopt.bodies.corners import copies
 from contactopt.bodies.elements import (
     Weight,
     contact_trace,
+    face_integrals,
     make_basis,
     node_unknowns,
     nodes_on,
@@ -33,8 +35,10 @@ from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
 from contactopt.scenes.loads import Load
+from contactopt.scenes.loads.load import Face
 from contactopt.scenes.scene import Part, Scene
 
+CLOSED = 1e-3  # of the area of a face: the length of the integral of its normals that is none
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 
 
@@ -47,6 +51,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     kind = scene.analysis
     weight = (kind.measure(scene.thickness) * scene.copies, kind.revolved)
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
+    part = placed(scene, part, basis, weight)
     A = isotropic_stiffness(basis, kind.constants(part.material), weight)
     fixed = _constrained(scene, part, basis)
     if fixed.held.all():
@@ -69,26 +74,28 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
             raise InputError(f"body '{part.name}', boundary '{name}': {error}") from None
     return Assembly(
         part.name,
-        kind,
-        part.material,
-        basis,
-        weight,
         A,
         _load(part, basis, weight),
         fixed.prescribed,
         np.flatnonzero(~fixed.held),
         fixed.motion,
         np.array(fixed.plate_forces, dtype=float),
-        traces,
         rigid_motions,
         tuple(fixed.driven),
         fixed.holders,
+        reload_body,
+        kind,
+        part.material,
+        basis,
+        weight,
+        traces,
         _mirrored_nodes(scene, part, basis, fixed.held),
     )
 
 
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     """The body with the loads of another scene; InputError if other unknowns are held or driven."""
+    part = placed(scene, part, body.basis, body.weight)
     fixed = _constrained(scene, part, body.basis)
     held = np.array_equal(np.flatnonzero(~fixed.held), body.free)
     if not held or not np.array_equal(fixed.motion, body.motion):
@@ -148,7 +155,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             f" {mesh.p[0].min():g}."
         )
     known = mesh.boundaries or {}
-    names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
+    names = [*scene.surfaces_of(part), *(name for s in part.supports for name in s.faces(known))]
     names += [load.boundary for load in part.loads if load.boundary]
     filled = sorted(boundary for boundary, facets in known.items() if len(facets))
     for name in names:
@@ -161,7 +168,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
 
 
-def _words(mesh: Any) -> str:
+def _words(mesh: Mesh) -> str:
     """What a mesh that does not fit is."""
     if not isinstance(mesh, skfem.Mesh):
         return type(mesh).__name__
@@ -192,6 +199,37 @@ def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:
         f"body '{part.name}': its mesh falls into {pieces + lost} pieces; remove nodes that belong"
         " to no element, merge duplicated nodes, or model each piece as a body of its own."
     )
+
+
+def face_of(
+    scene: Scene, part: Part, basis: skfem.CellBasis, weight: Weight, boundary: str
+) -> Face:
+    """A face of a body. InputError if its normals have no mean."""
+    area, normal, centre = face_integrals(basis, basis.mesh.boundaries[boundary], weight)
+    if scene.analysis.revolved:  # all around the axis
+        normal, centre = normal * [0.0, 1.0], centre * [0.0, 1.0]
+    length = float(np.linalg.norm(normal))
+    if length < CLOSED * area:
+        raise InputError(
+            f"body '{part.name}': the normals of {boundary!r} point around, and have no mean along"
+            " which a bolt could pull; name a face with one side."
+        )
+    held = _Constraints(scene, part, basis, np.zeros(basis.N), np.zeros(basis.N, dtype=bool))
+    held.add_supports()
+    fast = {c for c in scene.components if held.held[held.unknowns(boundary, c)].any()}
+    fast |= {scene.components[0]} if scene.analysis.revolved else set()
+    return Face(normal / length, area, centre / area, scene.components, frozenset(fast))
+
+
+def placed(scene: Scene, part: Part, basis: skfem.CellBasis, weight: Weight) -> Part:
+    """The part with its loads as they act on the faces of this mesh."""
+    if not any(load.shared for load in part.loads):
+        return part
+    loads = (
+        load.on(face_of(scene, part, basis, weight, load.boundary)) if load.shared else load
+        for load in part.loads
+    )
+    return replace(part, loads=tuple(loads))
 
 
 def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:
@@ -286,7 +324,13 @@ class _Constraints:
             if values is None:
                 values = dict.fromkeys(self.scene.components, 0.0)
             for component, value in values.items():
-                where = self.unknowns(support.boundary, component)
+                faces = support.faces(self.basis.mesh.boundaries)
+                where = reduce(np.intersect1d, (self.unknowns(f, component) for f in faces))
+                if not len(where):
+                    raise InputError(
+                        f"body '{self.part.name}': the boundaries of the support on"
+                        f" {support.boundary!r} share no node; name boundaries that meet."
+                    )
                 if np.any(self.held[where] & (self.prescribed[where] != value)):
                     raise InputError(
                         f"body '{self.part.name}': the support on {support.boundary!r} prescribes"

@@ -28,15 +28,11 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
-from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.body import reload_body
-from contactopt.bodies.element_stress import added_work, fields_of, limits_of, recovery_errors
-from contactopt.bodies.fields import Fields, Region, Validity
+from contactopt.bodies.assembly import Assembly, Matrices
 from contactopt.bodies.motions import work
-from contactopt.bodies.protocol import Body
+from contactopt.bodies.protocol import Body, FreeMotions, Seen, Way
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
-from contactopt.bodies.stress_recovery import StressMap, stress_map
 from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.linear.operators import Product
 from contactopt.linear.saddle_point import BodyTerm
@@ -49,7 +45,7 @@ KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body
 
 @dataclass(frozen=True, eq=False)
 class ElasticBody(Body):
-    """An Assembly with a solver of its linear system.
+    """Matrices with a solver of its linear system.
 
     kept        free unknowns without the fixing unknowns of a body that floats
     interface   (m,) kept unknowns of the contact surfaces, on which contact forces act
@@ -64,7 +60,7 @@ class ElasticBody(Body):
                 (contactopt.bodies.thin)
     """
 
-    body: Assembly
+    body: Matrices
     solver: BodySolver
     kept: np.ndarray
     interface: np.ndarray
@@ -89,35 +85,23 @@ class ElasticBody(Body):
     def unknowns(self) -> int:
         return len(self.body.free)
 
-    @cached_property
-    def iterative(self) -> bool:
-        return self.solver.iterative
+    @property
+    def view(self) -> Matrices:  # type: ignore[override]
+        return self.body
+
+    @property
+    def way(self) -> Way:  # type: ignore[override]
+        return Way(self.solver.iterative, self.solver.complete, self.solver.releases_lock)
 
     @cached_property
-    def complete(self) -> bool:
-        return self.solver.complete
-
-    @cached_property
-    def parallel(self) -> bool:
-        return self.solver.releases_lock
-
-    @cached_property
-    def motions(self) -> np.ndarray:
-        """(n, p + i) displacement fields of the free motions, those of plates first."""
-        return np.concatenate(
-            [self.extended @ self.modes[0], self.body.rigid_motions.fields], axis=1
-        )
-
-    @cached_property
-    def motion_names(self) -> tuple[str, ...]:
-        own = self.modes[0]
+    def motions(self) -> FreeMotions:
+        """Those of plates first."""
+        own, rigid = self.modes[0], self.body.rigid_motions
         alone = np.abs(own).sum(axis=1) == 1.0
         leading = [int(np.argmax(alone & (column == 1.0))) for column in own.T]
-        return (*(self.body.driven[i] for i in leading), *self.body.rigid_motions.names)
-
-    def plates(self, U: np.ndarray) -> dict[str, float]:
-        columns = zip(self.body.driven, self.body.motion.T)
-        return {name: float(column @ U / column.sum()) for name, column in columns}
+        names = (*(self.body.driven[i] for i in leading), *rigid.names)
+        fields = np.concatenate([self.extended @ own, rigid.fields], axis=1)
+        return FreeMotions(fields, names, self.resultants)
 
     @cached_property
     def elastic_modes(self) -> np.ndarray:
@@ -127,7 +111,7 @@ class ElasticBody(Body):
     @cached_property
     def _restricted(self) -> Product:
         """Products with the block of A_ff^-1 on `interface`."""
-        if self.complete:
+        if self.solver.complete:
             return self.solver.trailing_product
         return self.solver.restricted(np.searchsorted(self.kept, self.interface))
 
@@ -139,30 +123,26 @@ class ElasticBody(Body):
             return E, E  # one array, so that their product is symmetric to the last digit
         return np.concatenate([E, -Z, -Y], axis=1), np.concatenate([E, Y, Z], axis=1)
 
-    def product(self, T: sp.csr_matrix) -> Product:
+    def through(self, T: sp.csr_matrix) -> Seen:
         local, act, (left, right) = T[:, self.interface], self._restricted, self._low_rank(T)
         back = local.T.tocsr()
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
             return np.asarray(local @ act(back @ X, accuracy) + left @ (right.T @ X))
 
-        return product
+        def entries() -> np.ndarray:
+            # T G T' from the block of G on the contact unknowns, and what is of low rank
+            C, added = local @ (local @ self.solver.trailing_inverse()).T, left @ right.T
+            return np.asarray((C + C.T) / 2 + (added + added.T) / 2)
 
-    def term(self, T: sp.csr_matrix) -> BodyTerm | None:
+        size = np.asarray(abs(local).sum(axis=1)).ravel() + np.abs(right).sum(axis=1)
+        return Seen(product, entries, size > 0, None, self._term(T, (left, right)))
+
+    def _term(self, T: sp.csr_matrix, low_rank: tuple[np.ndarray, np.ndarray]) -> BodyTerm | None:
         if not self.solver.iterative or self.solver.iteration is None:
             return None
-        entries, low_rank = self.body.A.diagonal()[self.kept], self._low_rank(T)
+        entries = self.body.A.diagonal()[self.kept]
         return BodyTerm(T[:, self.kept], *self.solver.iteration, entries, low_rank)
-
-    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        # T G T' from the block of G on the contact unknowns, and what is of low rank
-        local, (left, right) = T[:, self.interface], self._low_rank(T)
-        C, added = local @ (local @ self.solver.trailing_inverse()).T, left @ right.T
-        return np.asarray((C + C.T) / 2 + (added + added.T) / 2)
-
-    def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        size = np.asarray(abs(T[:, self.interface]).sum(axis=1)).ravel()
-        return np.asarray(size + np.abs(self._low_rank(T)[1]).sum(axis=1) > 0)
 
     def displacement(
         self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
@@ -170,11 +150,11 @@ class ElasticBody(Body):
         """U of all unknowns, eq (13) of the paper."""
         if free is not None:
             left, right = self._low_rank(sp.identity(len(force), format="csr"))
-            U = self.at_rest + self.motions @ multipliers + left @ (right.T @ force)
+            U = self.at_rest + self.motions.fields @ multipliers + left @ (right.T @ force)
             U[self.kept] += free
             return np.asarray(U)
         # One solve for loads and contact forces together: in a thin body each alone moves it far.
-        return np.asarray(self._under(force) + self.motions @ multipliers)
+        return np.asarray(self._under(force) + self.motions.fields @ multipliers)
 
     def _under(self, force: np.ndarray) -> np.ndarray:
         """Displacement (n,) under loads and nodal forces (n,), with multipliers of zero."""
@@ -203,94 +183,41 @@ class ElasticBody(Body):
         missing = -self.body.stiffness_change(constant, U)  # acts like a load
         return (
             self.elastic_modes @ (self.elastic_modes.T @ missing) + self.relieved(missing),
-            self.motions.T @ missing,
+            self.motions.fields.T @ missing,
         )
 
-    def material_work(
-        self, constant: str, U: np.ndarray, force: np.ndarray, dual: np.ndarray, W: np.ndarray
-    ) -> float:
-        return -float(W @ self.body.stiffness_change(constant, U))
-
-    def load_work(
-        self, scene: Scene, part: Part, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
-    ) -> float:
-        old, new = self.body, reload_body(self.body, scene, part)
-        prescribed, plates = new.prescribed - old.prescribed, self.modes[0].shape[1]
-        driven = self.modes[1] @ (self.elastic_modes.T @ dual) + self.modes[0] @ weights[:plates]
-        loads = new.load - old.load - old.A @ prescribed
-        return float(dual @ prescribed + W @ loads + driven @ (new.plate_forces - old.plate_forces))
-
-    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self.body.A @ U, np.zeros(len(U))
-
-    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
-        return float(U @ self.body.stiffness_change(constant, U)) / 2
-
-    def energy(self, U: np.ndarray) -> float:
-        return float(U @ (self.body.A @ U)) / 2
-
-    def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """Loads, reactions of supports, and each plate's total force, shared out."""
-        body, F = self.body, self.body.A @ U
-        F[body.free] = body.load[body.free]
-        total = body.plate_forces + body.motion.T @ body.load
-        return np.asarray(F + body.motion @ ((total - body.motion.T @ F) / body.motion.sum(axis=0)))
-
-    def held_by(self, U: np.ndarray, force: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        F, found = self.body.A @ U - self.body.load - force, {}
-        for name, unknowns in self.body.holders.items():
-            own = np.zeros(len(F))
-            own[unknowns] = F[unknowns]
-            found[name] = self.acting(own)
-        return found
-
-    def acting(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        nodal = force[self.body.unknowns]
-        nodes = np.flatnonzero(nodal.any(axis=0))
-        return self.body.locations[:, nodes], nodal[:, nodes]
-
-    def fields(self, U: np.ndarray) -> Fields:
-        return fields_of(self.body, U)
-
-    def limits(self, U: np.ndarray, force: np.ndarray) -> Validity:
-        return limits_of(self.body, U, force)
-
-    def recovery_errors(self, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:
-        return recovery_errors(self.body, U, *others)
-
-    def added_work(
-        self, volumes: np.ndarray, load: np.ndarray, U: np.ndarray, *others: np.ndarray
-    ) -> tuple[np.ndarray, ...]:
-        return added_work(self.body, volumes, load, U, *others)
-
-    def on_elements(self, values: np.ndarray) -> np.ndarray:
-        dofs = self.body.basis.element_dofs
-        count = np.maximum(np.bincount(dofs.ravel(), minlength=len(values)), 1)
-        return np.asarray((values / count)[dofs].sum(axis=0))
-
-    def stress_map(self, region: Region, by_poisson: bool = False) -> StressMap:
-        return stress_map(self.body, region, by_poisson)
+    def internal_forces(self, U: np.ndarray, force: np.ndarray) -> np.ndarray:
+        return np.asarray(self.body.A @ U)
 
     def loaded(self, scene: Scene, part: Part) -> ElasticBody:
-        return _at_rest(self, reload_body(self.body, scene, part))
+        return _at_rest(self, self.body.reload(self.body, scene, part))
 
-    def grounded(self, modulus: float) -> ElasticBody:
-        told = self.ground is None and not self.solver.iterative
-        if not (told and is_thin(self.body, self.relieved)):
-            return self
-        body, ground = on_ground(self.body, modulus)
-        return condense(body, self.solver.name, self.complete, sp.diags(ground, format="csr"))
 
-    def pulled(self, U: np.ndarray) -> ElasticBody:
-        if self.ground is None:
-            return self
-        motions = self.body.rigid_motions
-        pull = self.ground @ (U - motions.fields @ (motions.forces.T @ U))
-        return _at_rest(replace(self, pull=pull), self.body)
+def on_soft_ground(body: Body, modulus: float) -> Body:
+    """An elastic body on a soft ground if it is so thin that rounding moves it
+    (contactopt.bodies.thin), beside bodies whose softest has Young's modulus `modulus` [stress];
+    else the body itself.
+    """
+    if not isinstance(body, ElasticBody) or not isinstance(body.body, Assembly):
+        return body
+    told = body.ground is None and not body.solver.iterative
+    if not (told and is_thin(body.body, body.relieved)):
+        return body
+    held, ground = on_ground(body.body, modulus)
+    return condense(held, body.solver.name, body.solver.complete, sp.diags(ground, format="csr"))
+
+
+def pulled(body: Body, U: np.ndarray) -> Body:
+    """A body with its ground pulling it towards a displacement (n,); itself without a ground."""
+    if not isinstance(body, ElasticBody) or body.ground is None:
+        return body
+    motions = body.body.rigid_motions
+    pull = body.ground @ (U - motions.fields @ (motions.forces.T @ U))
+    return _at_rest(replace(body, pull=pull), body.body)
 
 
 def condense(
-    body: Assembly, solver: str = "auto", entries: bool = True, ground: sp.csr_matrix | None = None
+    body: Matrices, solver: str = "auto", entries: bool = True, ground: sp.csr_matrix | None = None
 ) -> ElasticBody:
     """Make one body's linear system solvable, by a `solver`, and condense its plates.
 
@@ -321,7 +248,7 @@ def condense(
 
 
 def _solver(
-    body: Assembly, name: str, whole: sp.csr_matrix, kept: np.ndarray, trailing: np.ndarray | None
+    body: Matrices, name: str, whole: sp.csr_matrix, kept: np.ndarray, trailing: np.ndarray | None
 ) -> BodySolver:
     """A solver for the matrix on the kept unknowns, some of which may be eliminated last."""
     dofs, n = body.unknowns, len(body.load)
@@ -338,7 +265,7 @@ def _solver(
 
 
 def _extended(
-    body: Assembly, solver: BodySolver, whole: sp.csr_matrix, kept: np.ndarray
+    body: Matrices, solver: BodySolver, whole: sp.csr_matrix, kept: np.ndarray
 ) -> np.ndarray:
     """The plate motions M extended into the body, Z = M - A_ff^-1 A_f: M (n, p)."""
     # A plate that alone holds a body along itself moves it as a rigid whole, for which there is
@@ -357,7 +284,7 @@ def _extended(
     return extended
 
 
-def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
+def _relief(body: Matrices, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
     """Y = G S - Z (S' G S) / 2 of contactopt.bodies.motions, (n, i), for floating bodies."""
     Z, S = body.rigid_motions.fields, body.rigid_motions.forces
     Y = np.zeros(Z.shape)
@@ -367,7 +294,7 @@ def _relief(body: Assembly, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
     return Y
 
 
-def _rigid_extension(body: Assembly) -> np.ndarray:
+def _rigid_extension(body: Matrices) -> np.ndarray:
     """The unit motions of the plates (n, p) with the free unknowns of the same component moved
     along, unless a support holds another part of the body in that component.
     """
@@ -380,7 +307,7 @@ def _rigid_extension(body: Assembly) -> np.ndarray:
     return np.asarray(extended)
 
 
-def _at_rest(old: ElasticBody, body: Assembly) -> ElasticBody:
+def _at_rest(old: ElasticBody, body: Matrices) -> ElasticBody:
     """The body `old` under the loads of `body`."""
     # With the prescribed displacements put in, loads act on the free unknowns and on the plates: p
     # + Z' (f - A g).

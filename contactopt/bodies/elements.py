@@ -257,14 +257,29 @@ def surface_load(
     """The forces (N,) on the unknowns of a load on facets (f,), of a density [stress] at places and
     their outward normals.
     """
-    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], SMOOTH)
-    at = Faces(basis.mesh, np.asarray(boundary), points)
-    places = at.places
-    measure = at.scale * share * weight_at(weight, places)
+    at, places, measure = _rule(basis, boundary, weight)
     stress = np.broadcast_to(density(places, at.normals), places.shape)
     forces = np.einsum("fiq,dfq,fq->idf", at.values(basis.elem.elem), stress, measure)
     dofs = basis.element_dofs[:, at.owner]  # of all components of the first shape function, ...
     return np.bincount(dofs.ravel(), forces.ravel(), minlength=basis.N)
+
+
+def face_integrals(
+    basis: skfem.CellBasis, boundary: np.ndarray, weight: Weight
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """The area of facets (f,), and the integrals (dim,) of outward normals and of places there."""
+    at, places, measure = _rule(basis, boundary, weight)
+    return float(measure.sum()), *((own * measure).sum(axis=(1, 2)) for own in (at.normals, places))
+
+
+def _rule(
+    basis: skfem.CellBasis, boundary: np.ndarray, weight: Weight
+) -> tuple[Faces, np.ndarray, np.ndarray]:
+    """Points of a quadrature on facets (f,), their places (dim, f, q) and weights (f, q)."""
+    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], SMOOTH)
+    at = Faces(basis.mesh, np.asarray(boundary), points)
+    places = at.places
+    return at, places, at.scale * share * weight_at(weight, places)
 
 
 def nodes_on(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> np.ndarray:

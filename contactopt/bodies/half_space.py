@@ -25,9 +25,9 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembled import Surface, UndividedBody
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
+from contactopt.bodies.protocol import Seen
 from contactopt.errors import InputError
 from contactopt.linear.convolution import Convolution, Kernel, embedding
-from contactopt.linear.operators import Product
 from contactopt.material import Material, lame
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import SIDES
@@ -84,7 +84,7 @@ class HalfSpaceBody(UndividedBody):
         return np.concatenate([np.tile(self.given, k), np.zeros(self.unknowns), self.given])
 
     @cached_property
-    def motions(self) -> np.ndarray:
+    def fields(self) -> np.ndarray:
         k, still = int(np.prod(self.grid)), np.zeros((self.unknowns, self.shifts.shape[1]))
         return np.concatenate([np.tile(self.shifts, (k, 1)), still, self.shifts])
 
@@ -133,7 +133,7 @@ class HalfSpaceBody(UndividedBody):
         """Its products are so cheap that an array of its compliance never pays."""
         return True
 
-    def convolution(self, T: sp.csr_matrix) -> Kernel | None:
+    def _seen_kernel(self, T: sp.csr_matrix) -> Kernel | None:
         """For maps to displacements of all points in their order, in components +-n, +-t1, +-t2."""
         k, dim = int(np.prod(self.grid)), len(self.components)
         own = np.roll(np.arange(dim), 1)  # n is the last component
@@ -148,14 +148,15 @@ class HalfSpaceBody(UndividedBody):
         symbols = {(a, b): sign[a] * sign[b] * symbol for (a, b), symbol in known.items()}
         return replace(self.kernel, symbols=symbols)
 
-    def product(self, T: sp.csr_matrix) -> Product:
+    def through(self, T: sp.csr_matrix) -> Seen:
         back, act = T.T.tocsr(), self._compliance_product
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
             moved = [act(force, accuracy) for force in (back @ X).T]
             return np.asarray(T @ np.stack(moved, axis=1))
 
-        return product
+        moved = np.asarray(np.diff(T.indptr) > 0)
+        return Seen(product, lambda: self._entries(T), moved, self._seen_kernel(T))
 
     def _compliance_product(self, force: np.ndarray, accuracy: float | None = None) -> np.ndarray:
         """C F (n,) for nodal forces F (n,): displacements, followed by the forces."""
@@ -165,7 +166,7 @@ class HalfSpaceBody(UndividedBody):
         moved = np.roll((operator @ turned).reshape(-1, dim), -1, axis=1).ravel()
         return np.concatenate([moved, force[:m], np.zeros(dim)])
 
-    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
+    def _entries(self, T: sp.csr_matrix) -> np.ndarray:
         k, dim = int(np.prod(self.grid)), len(self.components)
         order = (np.arange(k)[:, None] * dim + np.roll(np.arange(dim), -1)).ravel()
         C = self.kernel.entries()[np.ix_(order, order)]  # in the order of the components
@@ -173,14 +174,11 @@ class HalfSpaceBody(UndividedBody):
         made = local @ (local @ C).T
         return np.asarray((made + made.T) / 2)
 
-    def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.asarray(np.diff(T.indptr) > 0)
-
     def displacement(
         self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
     ) -> np.ndarray:
         return np.asarray(
-            self.at_rest + self.motions @ multipliers + self._compliance_product(force)
+            self.at_rest + self.fields @ multipliers + self._compliance_product(force)
         )
 
     def material_change(
@@ -191,31 +189,20 @@ class HalfSpaceBody(UndividedBody):
         change = np.zeros(len(U))
         if constant == "E":
             change[: self.unknowns] = -self._compliance_product(force)[: self.unknowns] / E
-            return change, np.zeros(len(self.resultants))
+            return change, np.zeros(self.shifts.shape[1])
         h = min(0.1, (0.5 - nu) / 2, (1 + nu) / 2)
         for sign in (1.0, -1.0):
             other = replace(self, part=replace(self.part, material=Material(E, nu + sign * h)))
             change[: self.unknowns] += (
                 sign * other._compliance_product(force)[: self.unknowns] / (2 * h)
             )
-        return change, np.zeros(len(self.resultants))
+        return change, np.zeros(self.shifts.shape[1])
 
-    def energy_gradient(self, U: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        by_force = self._compliance_product(force)
-        by_force[self.unknowns :] = 0.0
-        return np.zeros(len(U)), by_force
-
-    def energy_change(self, constant: str, U: np.ndarray, force: np.ndarray) -> float:
-        return float(force @ self.material_change(constant, U, force)[0]) / 2
-
-    def energy(self, U: np.ndarray) -> float:
-        force = U[self.unknowns : 2 * self.unknowns]
-        return float(force @ self._compliance_product(force)[: self.unknowns]) / 2
-
-    def external_forces(self, U: np.ndarray) -> np.ndarray:
-        """What keeps the body in equilibrium; it acts on the body as a whole."""
+    def internal_forces(self, U: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """The contact forces on the points, and what balances them on the body as a whole."""
         m, dim = self.unknowns, len(self.components)
-        return np.concatenate([np.zeros(2 * m), -U[m : 2 * m].reshape(-1, dim).sum(axis=0)])
+        F = U[m : 2 * m]
+        return np.concatenate([F, np.zeros(m), -F.reshape(-1, dim).sum(axis=0)])
 
     def loaded(self, scene: Scene, part: HalfSpace) -> HalfSpaceBody:
         """With other values of the total force and of the displacement."""

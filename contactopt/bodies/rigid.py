@@ -16,9 +16,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import Surface, UndividedBody
+from contactopt.bodies.protocol import Seen
 from contactopt.checks import real_array
 from contactopt.errors import InputError
-from contactopt.linear.operators import Product
 from contactopt.scenes.scene import Rigid, Scene
 
 log = logging.getLogger(__name__)
@@ -45,7 +45,7 @@ class RigidBody(UndividedBody):
         return np.concatenate([self.given, 0 * self.given])
 
     @cached_property
-    def motions(self) -> np.ndarray:
+    def fields(self) -> np.ndarray:
         return np.concatenate([self.shifts, 0 * self.shifts])
 
     @property
@@ -121,24 +121,19 @@ class RigidBody(UndividedBody):
             )
         return np.asarray(other.weights @ gap)
 
-    def product(self, T: sp.csr_matrix) -> Product:
-        return lambda X, accuracy: np.zeros(X.shape)
-
-    def compliance(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.zeros((T.shape[0], T.shape[0]))
-
-    def moved(self, T: sp.csr_matrix) -> np.ndarray:
-        return np.zeros(T.shape[0], dtype=bool)
+    def through(self, T: sp.csr_matrix) -> Seen:
+        rows = T.shape[0]
+        still = np.zeros(rows, dtype=bool)
+        return Seen(lambda X, _: np.zeros(X.shape), lambda: np.zeros((rows, rows)), still)
 
     def displacement(
         self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
     ) -> np.ndarray:
         follows = np.roll(force, len(self.components))
-        return np.asarray(self.at_rest + self.motions @ multipliers + follows)
+        return np.asarray(self.at_rest + self.fields @ multipliers + follows)
 
-    def external_forces(self, U: np.ndarray) -> np.ndarray:
-        dim = len(self.components)
-        return np.concatenate([-U[dim:], np.zeros(dim)])
+    def internal_forces(self, U: np.ndarray, force: np.ndarray) -> np.ndarray:
+        return np.zeros(len(U))
 
     def loaded(self, scene: Scene, part: Rigid) -> RigidBody:
         """With other values of the total force, and other free components if need be."""

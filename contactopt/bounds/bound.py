@@ -65,6 +65,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import energy
 from contactopt.bounds.pressed_scene import PressedScene
 from contactopt.bounds.uneven_traction import uneven_traction
 from contactopt.errors import InputError
@@ -101,7 +102,7 @@ class Bound:
         self.joint = float(np.linalg.norm(uneven))
         both = 2 * float(uneven @ np.sqrt(np.maximum(squares, 0.0)))  # in each element norms add
         self.mesh = float(np.sqrt(self.size(left) ** 2 + both + self.joint**2))
-        energies = [body.energy(U) for body, U in zip(scene.bodies, displaced)]
+        energies = [energy(body, U, 0 * U) for body, U in zip(scene.bodies, displaced)]
         self.norm = float(np.sqrt(2 * sum(energies)))
         gaps = scene.work(scene.tractions[:, 0], self.displacement)
         slips = scene.slip_work(before) + scene.slip_work(added)
@@ -153,9 +154,8 @@ class Bound:
     def balanced_with(
         self, tractions: np.ndarray, multipliers: np.ndarray, forces: tuple[Any, ...] | None = None
     ) -> Data:
-        """Stresses in equilibrium with contact tractions and the loads of the scene; of an adjoint
-        those with the `forces` on its bodies, if any, in place of the loads: the forces A u_h are
-        those of the stress of v.
+        """Stresses in equilibrium with contact tractions and the loads; of an adjoint with the
+        `forces` on its bodies in their place, where the forces A u_h are those of the stress of v.
         """
         scene, out = self.scene, list[Any]()
         own = scene.reduction.own_multipliers(multipliers)

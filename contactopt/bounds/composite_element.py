@@ -21,9 +21,8 @@ def components() -> list[tuple[int, int]]:
 
 @cache
 def reference_stress() -> np.ndarray:
-    """The stress (value, component, input) of the reference element, which the inputs determine:
-    moments of tractions, then a body force. The integral of a product of two stresses is WEIGHT
-    times the sum of the products of their values.
+    """The stress (value, component, input) of the reference element by the inputs: moments of
+    tractions, then a body force. Integrals of products are WEIGHT times sums over the values.
     """
     d = 3
     x = np.concatenate([np.zeros((1, d)), np.eye(d)])

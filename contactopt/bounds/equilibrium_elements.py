@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -133,13 +133,11 @@ class EquilibriumElements(Simplices):
         force: np.ndarray,
         held: np.ndarray,
         moments: np.ndarray,
-        answer: Any = None,
+        answer: object = None,
     ) -> tuple[np.ndarray, float]:
-        """The stress (e, s, 4) of the head of this module that is nearest to `stress`, and the
-        largest force by which an element is out of balance over the largest force on one.
-
-        The arguments are those of Tetrahedra.equilibrated(), but `moments` (facets, 2, 2) take the
-        hat functions of the edge, in bodies of revolution times r, and `answer` is not needed.
+        """The stress (e, s, 4) of this module's head that is nearest to `stress`, and the largest
+        force out of balance over the largest one. Arguments as of Tetrahedra.equilibrated(), but
+        `moments` (facets, 2, 2) take hat functions, if revolved times r.
         """
         g, number = self._given(held, moments).ravel(), self._numbers[0]
         free = np.isnan(g)

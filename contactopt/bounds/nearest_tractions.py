@@ -46,10 +46,8 @@ STEPS = 30  # at most
 
 
 class Answer(NamedTuple):
-    """How a body answers forces.
-
-    degree  of its displacements
-    moved   displacements (dim, nodes) under nodal forces (dim, nodes), per thickness
+    """The degree of a body's displacements, and those (dim, nodes) under nodal forces per
+    thickness.
     """
 
     degree: int
@@ -57,12 +55,8 @@ class Answer(NamedTuple):
 
 
 class Energy(NamedTuple):
-    """Half the energy by moments (facets dim, dim).
-
-    product   products with its second derivative
-    diagonal  (facets dim, 1) of the second derivative, the mean of all components, so that the
-              answer does not depend on the axes
-    slope     its first derivative where the moments are zero;   twice  the energy there
+    """Half the energy by moments (facets dim, dim): products with its second derivative, its
+    diagonal averaged over components, its slope at zero, and twice the energy there.
     """
 
     product: Callable[[np.ndarray], np.ndarray]
@@ -73,13 +67,7 @@ class Energy(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BalancedMoments:
-    """The map P of the head of this module, and its transpose.
-
-    cells     elements of the body, a Simplices
-    material  of the body
-    balance   of its elements at their vertices
-    answer    of the body
-    """
+    """The map P of the head of this module, and its transpose, for the elements of a body."""
 
     cells: Any
     material: Material
@@ -124,9 +112,8 @@ class BalancedMoments:
         return F - self.cells.volume[:, None, None] * self._stresses(self._strains(F))
 
     def smooth(self, stress: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of a stress (e, dim + 1, dim, dim) of finite elements the means at the vertices, weighted
-        by volume, in the same form; and mean stresses (e, dim, dim) near these in weak equilibrium
-        with the same loads.
+        """The means of a stress (e, dim + 1, dim, dim) at the vertices, weighted by volume; and
+        mean stresses (e, dim, dim) near these in weak equilibrium with the same loads.
         """
         t, volume = self.cells.mesh.t, self.cells.volume[:, None, None]
         total, weight = np.zeros((t.max() + 1, *stress.shape[2:])), np.zeros((t.max() + 1, 1, 1))

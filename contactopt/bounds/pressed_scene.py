@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.elastic import ElasticBody
 from contactopt.bodies.rigid import RigidBody
+from contactopt.bodies.views import elements_of
 from contactopt.bounds.displaced_stress import Halves, halved
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
 from contactopt.bounds.facing_facets import (
@@ -73,7 +73,7 @@ class PressedScene:
         bound, size = self.limit_of(t), np.linalg.norm(t[:, 1:], axis=1)
         over = size > bound
         t[over, 1:] *= (bound[over] / size[over])[:, None]
-        given = [body.resultants for body in self.bodies]
+        given = [body.motions.resultants for body in self.bodies]
         self.tractions = self.balanced(t, np.concatenate(given))
         self.limit = self.limit_of(self.tractions)
         on_axis = (self.share == 0) & (self.solution.reactions[:, 0] > 0)
@@ -86,9 +86,10 @@ class PressedScene:
         """The elements of an elastic body, None for a rigid one."""
         if isinstance(body, RigidBody):
             return None
-        if not isinstance(body, ElasticBody):
+        elements = elements_of(body)
+        if elements is None:
             raise InputError(f"body '{body.name}' has no elements here; a bound needs them.")
-        mesh, degree, name = body.body.basis.mesh, body.body.degree, f"body '{body.name}'"
+        mesh, degree, name = elements.basis.mesh, elements.degree, f"body '{body.name}'"
         shape = mesh.refdom.__name__
         linear = ("RefQuad",) if degree == 1 else ()
         if shape not in ("RefTri", "RefTet", *linear) or is_curved(mesh):
@@ -176,7 +177,7 @@ class PressedScene:
         def moved(forces: np.ndarray) -> np.ndarray:
             own = np.zeros(len(body.at_rest))
             own[body.body.unknowns] = self.factor * forces
-            U = body.displacement(own, np.zeros(len(body.resultants))) - body.at_rest
+            U = body.displacement(own, np.zeros(len(body.motions.resultants))) - body.at_rest
             return np.asarray(U[body.body.unknowns])
 
         return Answer(body.body.degree, moved)
@@ -186,7 +187,7 @@ class PressedScene:
         it does there.
         """
         bodies = zip(self.bodies, self.loads)
-        work = np.concatenate([load.T @ body.motions for body, load in bodies], axis=1)
+        work = np.concatenate([load.T @ body.motions.fields for body, load in bodies], axis=1)
         if not work.shape[1]:
             return t
         works = (work.reshape(*t.shape, -1) * t[..., None]).sum(axis=1)  # (k, p)
@@ -276,6 +277,11 @@ class PressedScene:
                 moments[own] += size * np.asarray(load.value, dtype=float)
             elif loaded:
                 force += np.asarray(load.value, dtype=float)
+        for support in part.supports:
+            if support.boundary not in mesh.boundaries:
+                raise InputError(
+                    f"body '{part.name}': a bound knows no support at a point or edge."
+                )
         for boundary, names in holding:
             for name in components if names is None else names:
                 held[np.asarray(mesh.boundaries[boundary]), components.index(name)] = True

@@ -8,16 +8,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 
 @dataclass(frozen=True, eq=False)
 class Simplices:
-    """Straight-edged triangles or tetrahedra, with displacements and stresses on them.
-
-    mesh  of scikit-fem, whose vertices are p (dim, vertices) and t (dim + 1, e)
+    """Straight-edged triangles or tetrahedra of scikit-fem, with displacements and stresses on
+    them.
     """
 
-    mesh: Any
+    mesh: Mesh
 
     @cached_property
     def dim(self) -> int:

@@ -76,9 +76,9 @@ class Tetrahedra(Simplices):
         return 2 * shear * strain + lam * trace * np.eye(d)
 
     def data(self, moments: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """(e, inputs) what determines the composite stress on the reference element: forces (dim,)
-        or (e, dim) per volume, and moments (dim + 1, dim, e, dim) of tractions with the hat
-        functions of `others` on the facets of each element, whose normals point out of it.
+        """(e, inputs) what determines the composite stress on the reference element: force (dim,)
+        or (e, dim) per volume, and moments (dim + 1, dim, e, dim) of outward tractions on the
+        facets.
         """
         own = moments.reshape(-1, *moments.shape[2:])
         body = np.broadcast_to(self.ratio[:, None] * force, own.shape[1:])
@@ -154,13 +154,12 @@ class Tetrahedra(Simplices):
         moments: np.ndarray,
         answer: Answer,
     ) -> tuple[np.ndarray, float]:
-        """The data (e, inputs) of the stress s* of the head of this module, and the largest force
-        by which the hat function of a vertex was out of balance, over that of an element.
+        """The data (e, inputs) of the stress s*, and the largest force out of balance at a vertex
+        over that of an element.
 
-        `stress` (e, dim + 1, dim, dim) is that of finite elements at the vertices of each element,
-        and `force` (dim,) acts per volume. The boundary facets are held in the components `held`
-        (facets, dim), where their tractions are unknown; `moments` (facets, dim, dim) are those of
-        the other tractions, vertex by vertex with the hat functions [force per thickness].
+        `stress` (e, dim + 1, dim, dim) is that of finite elements at vertices, `force` (dim,) per
+        volume. Boundary facets are `held` (facets, dim) where tractions are unknown; `moments`
+        (facets, dim, dim) are those of the others, vertex by vertex [force per thickness].
         """
         known = (self.mesh.f2t[1] < 0)[:, None] & ~held
         balance = self._once(known.tobytes(), lambda: Balance(self.forces_of_moments, known))
@@ -237,9 +236,9 @@ class Tetrahedra(Simplices):
         given: np.ndarray,
         balance: Balance,
     ) -> tuple[np.ndarray, float]:
-        """Moments (facets, dim, dim) of tractions near those of a stress that hold all elements in
-        balance, with these `mean` stresses (e, dim, dim), and by how much they do not. Those that
-        are not `given` are nan there.
+        """Moments (facets, dim, dim) near those of a stress, with `given` ones where not nan, that
+        hold all elements in balance at these `mean` stresses (e, dim, dim), and by how much they do
+        not.
         """
         d, mesh = self.dim, self.mesh
         m = np.zeros(given.shape)

@@ -45,9 +45,8 @@ class Balance:
 
 
 def _inverse(balance: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
-    """The inverse of D D' for the balance D of elements by facets, which is block diagonal, one
-    block for each vertex. The equations of a vertex that nothing holds have one that follows from
-    the others.
+    """The inverse of D D' for the balance D of elements by facets: one block for each vertex. Where
+    nothing holds a vertex, one of its equations follows from the others.
     """
     D = (balance @ balance.T).tocoo()
     count, group = connected_components(D, directed=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contactopt.bodies.fields import Fields
+from contactopt.bodies.views import fields as fields_of
 from contactopt.coupling.reduction import Reduction
 from contactopt.linear.concurrency import each
 from contactopt.problem import Solution
@@ -15,5 +16,5 @@ def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
     a solution of its problem.
     """
     displaced = zip(reduction.bodies, reduction.displaced(solution))
-    fields = each(lambda pair: pair[0].fields(pair[1]), displaced)
-    return tuple(found for found in fields if found is not None)
+    found = each(lambda pair: fields_of(*pair), displaced)
+    return tuple(own for own in found if own is not None)

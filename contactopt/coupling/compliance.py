@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.protocol import Body
+from contactopt.bodies.protocol import Body, Seen
 from contactopt.coupling.coupling import Coupling
 from contactopt.errors import InputError
 from contactopt.linear.budget import spend
@@ -39,7 +39,7 @@ def _entries(bodies: Sequence[Body], maps: Maps) -> np.ndarray | sp.csr_array:
     """Q by its entries, symmetric to the last digit: sparse where most pairs share no body."""
     n = maps[0].shape[0]
     moving = _moving(bodies, maps)
-    made = each(lambda term: term[0].compliance(term[1]), moving, _parallel(moving))
+    made = each(lambda term: term[0].through(term[1]).entries(), moving, _parallel(moving))
     parts = [(rows, own) for (*_, rows), own in zip(moving, made)]
     if filling(maps) < SPARSE * n**2:
         rows = np.concatenate([np.repeat(rows, len(rows)) for rows, _ in parts])
@@ -59,7 +59,8 @@ def operator(
     bodies: Sequence[Body], maps: Maps, couplings: Sequence[Coupling]
 ) -> InterfaceOperator:
     """Q by its products: a convolution if every body has one, else with an estimated diagonal."""
-    kernels = [body.convolution(B) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    seen = [body.through(B) for body, B in zip(bodies, maps)]
+    kernels = [own.kernel for own in seen if own.moved.any()]
     known = [kernel for kernel in kernels if kernel is not None]
     if known and len(known) == len(kernels):
         if len({kernel.padded for kernel in known}) > 1:
@@ -70,9 +71,9 @@ def operator(
         return Convolution(sum(known[1:], known[0]))
     moving = _moving(bodies, maps)
     parallel = _parallel(moving)
-    acts = each(lambda term: term[0].product(term[1]), moving, parallel)
+    acts = each(lambda term: term[0].through(term[1]).product, moving, parallel)
     terms = [(act, rows) for act, (*_, rows) in zip(acts, moving)]
-    iterative = any(body.iterative for body in bodies)
+    iterative = any(body.way.iterative for body in bodies)
     unknowns = sum(B.shape[1] for B in maps)
 
     def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
@@ -92,28 +93,27 @@ def operator(
         return out
 
     weights = [nodal_weights(made.chart, made.areas) for made in couplings]
-    moved = np.any([body.moved(B) for body, B in zip(bodies, maps)], axis=0)
-    complete = all(body.complete for body in bodies)
+    moved = np.any([own.moved for own in seen], axis=0)
+    complete = all(body.way.complete for body in bodies)
     return InterfaceOperator(
         product,
         estimate_diagonal(product, weights, moved),
         (lambda: dense(_entries(bodies, maps))) if complete else None,
         None,
         iterative,
-        _before_condensation(bodies, maps) if iterative else None,
+        _before_condensation(seen) if iterative else None,
     )
 
 
-def _before_condensation(bodies: Sequence[Body], maps: Maps) -> CoupledForm:
+def _before_condensation(seen: Sequence[Seen]) -> CoupledForm:
     """Q from the equilibrium of the iterative bodies, and from products with the others."""
     terms: list[BodyTerm] = []
     others = []
-    for body, B in zip(bodies, maps):
-        term = body.term(B)
-        if term is not None:
-            terms.append(term)
-        elif body.moved(B).any():
-            others.append(body.product(B))
+    for own in seen:
+        if own.term is not None:
+            terms.append(own.term)
+        elif own.moved.any():
+            others.append(own.product)
     L, R = (np.concatenate([term.low_rank[side] for term in terms], axis=1) for side in (0, 1))
 
     def rest(r: np.ndarray) -> np.ndarray:
@@ -127,12 +127,12 @@ def _before_condensation(bodies: Sequence[Body], maps: Maps) -> CoupledForm:
 
 def _moving(bodies: Sequence[Body], maps: Maps) -> list[tuple[Body, sp.csr_matrix, np.ndarray]]:
     """The bodies that contact forces move, their maps' needed rows, and these rows of Q."""
-    needed = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.moved(B).any()]
+    needed = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.through(B).moved.any()]
     return [(body, B[rows], rows) for body, B, rows in needed]
 
 
 def _parallel(moving: list[tuple[Body, sp.csr_matrix, np.ndarray]]) -> list[bool]:
-    return [body.parallel for body, *_ in moving]
+    return [body.way.parallel for body, *_ in moving]
 
 
 def _rows(B: sp.csr_matrix) -> np.ndarray:

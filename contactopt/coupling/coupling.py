@@ -14,7 +14,8 @@ to the kind of the coupling.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib import import_module
 
@@ -107,7 +108,8 @@ def couple(
         why = "nodes and facets match" if free else "the contact names the side that carries it"
     for way in ways:
         try:
-            made = tested(_kind(way)(scene, pair, upper, lower), pair, (upper, lower))
+            with _about(pair):
+                made = tested(_kind(way)(scene, pair, upper, lower), pair, (upper, lower))
         except InputError as error:
             if way == ways[-1]:
                 raise
@@ -149,7 +151,19 @@ def _kind(name: str) -> Callable[..., Coupling]:
 def law_of(pair: Contact, made: Coupling) -> Law:
     """The law of the contacts of a pair of surfaces, with one parameter for each contact."""
     place = Place(made.areas, made.frames, pair.direction)
-    return make_law(pair.law, pair.mu, place, made.positions)
+    with _about(pair):
+        return make_law(pair.law, pair.mu, place, made.positions)
+
+
+@contextmanager
+def _about(pair: Contact) -> Iterator[None]:
+    """Within this block errors name the pair."""
+    try:
+        yield
+    except InputError as error:
+        if f"'{pair.name}'" in str(error):
+            raise
+        raise InputError(f"contact '{pair.name}': {error}") from error
 
 
 def of_contacts(

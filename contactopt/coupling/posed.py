@@ -14,6 +14,7 @@ from contactopt.bodies import assemble
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.protocol import Body
 from contactopt.checks import check_count, check_number
+from contactopt.coupling.bolts import check_bolts
 from contactopt.coupling.coupling import Coupling, couple, law_of, tested
 from contactopt.coupling.crosspoints import independent
 from contactopt.coupling.joined_once import check_once
@@ -47,6 +48,7 @@ def posed(
     """
     elements, zone = _checked(scene, elements, zone, Q)
     assembled = tuple(each(lambda part: assemble(scene, part, elements, zone), scene.parts))
+    check_bolts(scene, assembled)
     named = {body.name: body for body in assembled}
     sides = [(named[pair.bodies[0]], named[pair.bodies[1]]) for pair in scene.pairs]
     check_once(scene.pairs, sides)
@@ -111,8 +113,8 @@ def problem_of(
     q[:, 0] = gap
     for body, B in zip(bodies, maps):
         q += (B @ body.at_rest).reshape(q.shape)
-    V = np.concatenate([B @ body.motions for body, B in zip(bodies, maps)], axis=1)
-    s = np.concatenate([body.resultants for body in bodies])
+    V = np.concatenate([B @ body.motions.fields for body, B in zip(bodies, maps)], axis=1)
+    s = np.concatenate([body.motions.resultants for body in bodies])
     areas = np.concatenate([made.areas for made in couplings])
     points = np.concatenate([made.positions for made in couplings], axis=1)
     ends = np.cumsum([0, *(len(made.gap) for made in couplings)]).tolist()
@@ -122,5 +124,5 @@ def problem_of(
     law = laws[0][0] if len(laws) == 1 else join(laws)
     chart = pairs[0].chart if len(pairs) == 1 else None
     # what each multiplier is, for messages
-    names = tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motion_names)
+    names = tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motions.names)
     return InterfaceProblem(Q, q, law, V, s, areas, points, chart, pairs, names)

@@ -29,6 +29,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody
+from contactopt.bodies.elastic import on_soft_ground, pulled
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import card, count, line
@@ -125,7 +126,7 @@ class Reduction:
     @property
     def iterative(self) -> bool:
         """Whether products with Q cost iterations, so that a lower accuracy makes them cheaper."""
-        return any(body.iterative for body in self.bodies)
+        return any(body.way.iterative for body in self.bodies)
 
     @property
     def dofs(self) -> int:
@@ -134,7 +135,7 @@ class Reduction:
 
     def own_multipliers(self, multipliers: np.ndarray) -> tuple[np.ndarray, ...]:
         """The multipliers (p_b,) of each body, out of those of the problem."""
-        ends = np.cumsum([len(body.resultants) for body in self.bodies])
+        ends = np.cumsum([len(body.motions.resultants) for body in self.bodies])
         return tuple(np.split(multipliers, ends[:-1]))
 
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
@@ -144,7 +145,7 @@ class Reduction:
         if solution in self._known:
             return self._known[solution]
         given = [] if solution.displacements is None else list(solution.displacements.parts)
-        free = [given.pop(0) if given and body.iterative else None for body in self.bodies]
+        free = [given.pop(0) if given and body.way.iterative else None for body in self.bodies]
         parts = zip(self.bodies, self.maps, self.own_multipliers(solution.multipliers), free)
 
         def displaced(part: tuple[Body, sp.csr_matrix, np.ndarray, Any]) -> np.ndarray:
@@ -175,7 +176,7 @@ class Reduction:
     def pulled(self, solution: Solution) -> Reduction:
         """With the ground pulling each body towards its displacement in a solution."""
         displaced = self.displaced(solution)
-        bodies = tuple(body.pulled(U) for body, U in zip(self.bodies, displaced))
+        bodies = tuple(pulled(body, U) for body, U in zip(self.bodies, displaced))
         made = self._with(bodies, self.problem.Q)
         # what rounding in Q and q makes of the displacements of the contacts, beside the bodies'
         missing = self.seen(displaced) - self.problem.displacements(
@@ -330,7 +331,7 @@ def _way(
 def _on_ground(scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
     """The bodies of a scene, thin ones among them on a soft ground."""
     modulus = min(part.material.E for part in scene.parts if hasattr(part, "material"))
-    made = each(lambda body: body.grounded(modulus), bodies, _parallel(bodies))
+    made = each(lambda body: on_soft_ground(body, modulus), bodies, _parallel(bodies))
     for new, old in zip(made, bodies):
         if new is not old:
             log.info("body '%s' is thin: a soft ground holds it until the contact does", new.name)
@@ -338,4 +339,4 @@ def _on_ground(scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
 
 
 def _parallel(bodies: Sequence[Body]) -> list[bool]:
-    return [body.parallel for body in bodies]
+    return [body.way.parallel for body in bodies]

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactopt.checks import check_number, real_array
 from contactopt.derivatives.kinks import Onesided, Weak, of_kinks, weak_contacts
@@ -148,13 +149,9 @@ class Sensitivity:
     def forward(
         self, *, q: Any = None, mu: Any = None, s: Any = None, Q: Any = None, V: Any = None
     ) -> Change:
-        """The change of the solution along one direction of the data; where contacts are weakly
-        active, the one-sided one.
-
-        The data are q (k, dim) [length], the law's parameter mu, (k,) or one number, the resultants
-        s (p,) [force], Q (k dim, k dim), an array, a sparse matrix or an operator with products,
-        and V (k dim, p). InputError on changes of the wrong shape, and where the solution has no
-        derivative because it is not unique.
+        """The change of the solution along a direction of q (k, dim), mu (k,) or a number, s (p,),
+        Q (array, sparse or operator) and V; one-sided where contacts are weakly active. InputError
+        on wrong shapes, and where the solution is not unique.
         """
         problem, r, lam = self.problem, self.solution.reactions, self.solution.multipliers
         du = _given("q", q, problem.q.shape).copy()
@@ -194,13 +191,10 @@ class Sensitivity:
     def adjoint(
         self, *, reactions: Any = None, multipliers: Any = None, displacements: Any = None
     ) -> Dual:
-        """The gradient by all data of a function f(r, lambda, u), from one solve with the
-        transposed matrix.
-
-        Where contacts are weakly active (`differentiable` is False) it is the gradient of the piece
-        at which the solver ended, an element of the generalised derivative and no gradient of f.
-        `reactions` (k, dim) are df/dr, `multipliers` (p,) df/dlambda, and `displacements` (k, dim)
-        df/du of u = Q r + V lambda + q. InputError as forward().
+        """The gradient by all data of f(r, lambda, u) with the derivatives `reactions` (k, dim),
+        `multipliers` (p,) and `displacements` (k, dim), from one transposed solve. Where contacts
+        are weakly active it is that of the piece at which the solver ended. InputError as
+        forward().
         """
         problem = self.problem
         by_r = _given("reactions", reactions, problem.q.shape)
@@ -287,7 +281,7 @@ def told_apart(residual: float) -> float:
     return max(NEAR, ROUNDING * residual)
 
 
-def _given(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _given(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
     """The array of that shape; zeros if there is none, and one number fills it."""
     if value is None:
         return np.zeros(shape)

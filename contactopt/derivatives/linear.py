@@ -204,9 +204,8 @@ def _refined(
     weights: Stacked | float,
     accuracy: float,
 ) -> Stacked:
-    """Solve A x = b by `solve` again and again for what is left, to a reduction that it is told,
-    until |W (b - A x)| / |W b| is small enough; InputError if that is out of reach, because the
-    solution is not unique.
+    """Solve A x = b by `solve` again and again for what is left, until |W (b - A x)| / |W b| is
+    small enough; InputError if it is not, because the solution is not unique.
     """
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)

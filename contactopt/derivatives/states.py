@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import load_work, material_work
 from contactopt.checks import real_array
 from contactopt.coupling.reduction import Reduction
 from contactopt.derivatives.interface import Change, Dual, Sensitivity, sensitivity
@@ -91,7 +92,7 @@ class Step(State):
         bodies = self.reduction.bodies
         du, dmu = np.zeros(self.problem.q.shape), np.zeros(self.problem.contacts)
         dU = [0.0 * U for U in self.displaced]
-        ds = [np.zeros(len(body.resultants)) for body in bodies]
+        ds = [np.zeros(len(body.motions.resultants)) for body in bodies]
         for which, amount in direction.items():
             if which.is_field:
                 amount = _one_per_contact(which, amount, len(du))
@@ -108,7 +109,7 @@ class Step(State):
                     scene, part, step = self._changed(which, number)
                     new = old.loaded(scene, part)
                     moved = (new.at_rest - old.at_rest) / step
-                    balance = (new.resultants - old.resultants) / step
+                    balance = (new.motions.resultants - old.motions.resultants) / step
                 dU[number] = dU[number] + amount * moved
                 ds[number] += amount * balance
         for B, own in zip(self.reduction.maps, dU):
@@ -125,13 +126,19 @@ class Step(State):
         for number in self._concerned(which):
             G, W = back.forces[number], back.fields[number]
             if which.kind in MATERIAL:
-                total += base.bodies[number].material_work(
-                    which.kind, self.displaced[number], self.forces[number], G, W
+                own = base.bodies[number]
+                total += material_work(
+                    base.bodies[number],
+                    which.kind,
+                    self.displaced[number],
+                    self.forces[number],
+                    G,
+                    W,
                 )
             else:
                 scene, part, step = self._changed(which, number)
                 own = self.reduction.bodies[number]
-                total += own.load_work(scene, part, G, back.weights[number], W) / step
+                total += load_work(own, scene, part, G, back.weights[number], W) / step
         return total
 
 
@@ -235,10 +242,8 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
 
 
 def chain_of(result: Any, distance: float | None = None) -> Chain:
-    """The solved states of a result, to differentiate through: of what contactopt.run or
-    contactopt.follow returned, or of anything else with a reduction and a solution.
-
-    InputError for a result without a solved scene, and for a state that is not certified.
+    """The solved states of a result, to differentiate through. InputError for a result without a
+    solved scene, and for a state that is not certified.
     """
     path = result if isinstance(result, PathResult) else getattr(result, "path", None)
     if path is None:

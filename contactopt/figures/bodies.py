@@ -39,9 +39,8 @@ def deformed(
     ax: Any = None,
     couplings: Sequence[Coupling] = (),
 ) -> Any:
-    """Draw the deformed bodies, with these displacements and stresses, coloured by von Mises stress
-    and mirrored to the whole section (paper, figures 1 and 2). With the couplings of the pairs what
-    touches is drawn touching, whatever gap or overlap it had.
+    """Draw the deformed bodies, coloured by von Mises stress and mirrored to the whole section.
+    With the couplings what touches is drawn touching, whatever gap or overlap it had.
     """
     size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     largest = max(float(np.abs(f.displacement).max()) for f in fields)
@@ -81,11 +80,8 @@ def _closed(
 
 
 def _mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
-    """Beyond which place of a plane section the bodies are mirrored: the number of a coordinate
-    axis and the place on it [length]; None where the bodies are whole.
-
-    It is the axis of revolution, or the plane of symmetry of a half model: that cuts the contact
-    line at the origin of its chart, across the line.
+    """The coordinate axis and the place on it [length] beyond which a section is mirrored: its axis
+    of revolution, or the plane of symmetry at the origin of its chart; None if whole.
     """
     if scene.analysis.revolved:
         return 0, 0.0

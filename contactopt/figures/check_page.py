@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.elements import FACES, Faces
@@ -23,9 +25,9 @@ from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import Part, Scene, Support
 
-ROLES = ("no use", "support", "load", "plate", "contact")
+ROLES = ("no use", "support", "load", "plate", "bolt", "contact")
 NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundary that stay legible
 
 
@@ -123,8 +125,8 @@ def _write(
         move="move" if scene.dim == 2 else "turn",
         followers="",
         arrows="loads, supports, and normals from the lower to the upper body,",
-        convention="A negative gap is an overlap. The arrow of a plate is its total force. A"
-        " support holds along the axis of its triangles, along all axes if they are full.",
+        convention="A negative gap is an overlap. The arrow of a plate or bolt is its total force."
+        " A support holds along the axis of its triangles, along all axes if they are full.",
         pairs="",
         cells=_rows(lines if roles is ROLES else [f" {text}" for text in lines]),
     )
@@ -199,37 +201,48 @@ def _spread(places: np.ndarray, many: int) -> np.ndarray:
 
 
 def _boundaries(
-    scene: Scene, part: Part, mesh: Any, planes: set[tuple[int, float]]
+    scene: Scene, part: Part, mesh: Mesh, planes: set[tuple[int, float]]
 ) -> Iterator[dict[str, Any]]:
     """The named boundaries of a body, what its loads are, and along which axes supports hold it. A
     boundary in a plane of symmetry, across which the body is shown whole, is hidden.
     """
     held = {support.boundary: support.displacement for support in part.supports}
     centre = _spatial(mesh.p.mean(axis=1, keepdims=True))[0]
+    size = float(np.ptp(mesh.p, axis=1).max())
     loads = {load.boundary: load for load in part.loads}
     for name, item in _sides(mesh):
         load = loads.get(name)
-        role = (3 if load.level else 2) if load else 1 if name in held else 0
+        role = (4 if load.shared else 3 if load.level else 2) if load else 1 if name in held else 0
         if role == 0 and name in scene.surfaces_of(part):
             continue  # the pairs show it
         places, vector = item["places"], item["vector"]
         if load:
-            vector[:, : scene.dim] = load.density(*_normals(mesh, mesh.boundaries[name])).T
-        if load and load.level:
+            x, n = _normals(mesh, mesh.boundaries[name])
+            vector[:, : scene.dim] = load.density(x, n).T
+        if load and load.total:
             middle = np.argmin(np.linalg.norm(places - places.mean(axis=0), axis=1))
-            vector[middle, : scene.dim] = [load.force.get(c, 0.0) for c in scene.components]
-        size = float(np.ptp(mesh.p, axis=1).max())
+            mean = n.mean(axis=1) / np.linalg.norm(n.mean(axis=1))
+            vector[middle, : scene.dim] = load.resultant(scene.components, mean)
+            item["marked"] = np.arange(len(places)) == middle
         if any(np.ptp(places[:, a]) <= 1e-9 * size >= abs(places[0, a] - x) for a, x in planes):
             item["hidden"] = True
         if role == 1:
-            axes = np.array([c in (held[name] or scene.components) for c in scene.components])
-            if axes.all():  # one symbol, across the boundary
-                axes = 2.0 * (
-                    np.arange(scene.dim) == np.argmin(np.ptp(places, axis=0)[: scene.dim])
-                )
-            outward = np.where(places.mean(axis=0) > centre + 1e-6 * size, 1.0, -1.0)
-            item["held"] = np.tile(outward * np.pad(axes, (0, 3 - scene.dim)), (len(places), 1))
+            item["held"] = _held(scene, held[name], places, centre, size)
         yield item | {"name": f"{part.name}: {name} ({ROLES[role]})", "role": role}
+    for name in held:
+        faces = Support(name).faces(mesh.boundaries)
+        if len(faces) > 1:
+            each = (facet_nodes(mesh, np.asarray(mesh.boundaries[face])) for face in faces)
+            places = _spatial(mesh.doflocs[:, reduce(np.intersect1d, each)])
+            yield {
+                "name": f"{part.name}: {name} ({ROLES[1]})",
+                "places": places,
+                "cells": np.zeros((0, 3), dtype=int),
+                "role": 1,
+                "marked": _spread(places, SYMBOLS),
+                "vector": np.zeros(places.shape),
+                "held": _held(scene, held[name], places, centre, size),
+            }
     for load in part.loads:
         if not load.boundary:
             force = np.array(list(load.values(scene.components).values()))
@@ -242,7 +255,22 @@ def _boundaries(
             }
 
 
-def _normals(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _held(
+    scene: Scene,
+    held: Mapping[str, float] | None,
+    places: np.ndarray,
+    centre: np.ndarray,
+    size: float,
+) -> np.ndarray:
+    """Symbols (k, 3) of a support at its places (k, 3), outwards along the axes that it holds."""
+    axes = np.array([c in (held or scene.components) for c in scene.components])
+    if axes.all():  # one symbol, across the boundary
+        axes = 2.0 * (np.arange(scene.dim) == np.argmin(np.ptp(places, axis=0)[: scene.dim]))
+    outward = np.where(places.mean(axis=0) > centre + 1e-6 * size, 1.0, -1.0)
+    return np.tile(outward * np.pad(axes, (0, 3 - scene.dim)), (len(places), 1))
+
+
+def _normals(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places of the nodes of facets, and outward normals there (dim, m), zero within edges."""
     corners = mesh.facets[:, facets]
     places = FACES[mesh.refdom.__name__][2][:, : len(corners)]
@@ -254,7 +282,7 @@ def _normals(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mesh.doflocs[:, nodes], sums[:, nodes] / np.where(length > 0, length, 1.0)
 
 
-def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+def _sides(mesh: Mesh) -> Iterator[tuple[str, dict[str, Any]]]:
     """The nodes of each named boundary, in space the triangles between them, and no arrows."""
     kind, faces = surface(*elements_of(mesh), _spatial(mesh.doflocs))
     for name, side in (mesh.boundaries or {}).items():
@@ -269,7 +297,7 @@ def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
         yield name, {"places": places, "cells": cells, "vector": vector, "marked": marked}
 
 
-def _faces_on(mesh: Any, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
+def _faces_on(mesh: Mesh, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
     """The faces of the surface of a solid (m, v) that are among some facets of its mesh."""
     shown, corners = np.sort(faces[:, : CORNERS[kind]], axis=1), mesh.facets[:, facets]
     wanted = np.sort(corners.T, axis=1)

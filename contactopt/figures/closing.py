@@ -19,15 +19,11 @@ def closing(
     surfaces: Iterable[tuple[np.ndarray, np.ndarray]],
     mirrors: Iterable[tuple[int, float]] = (),
 ) -> np.ndarray:
-    """The field d (n, dim) on the nodes of one body.
+    """The field d (n, dim) on the nodes `points` (n, dim) of a body.
 
-    An upper body has d = g n on its surface, a lower one d = 0. Elsewhere d is the mean of its
-    values at the nearest contacts of the body's surfaces, weighted by 1 / distance^2, and goes to
-    zero across planes of symmetry and the axis of revolution.
-
-    points    (n, dim) places of the nodes
-    surfaces  for each surface of the body the places (k, dim) of its contacts and d there
-    mirrors   (axis, place) of each plane
+    On the surface of an upper body d = g n, of a lower one 0. Elsewhere it is the mean of d at the
+    nearest contacts of `surfaces` (places (k, dim) and d there), weighted by 1 / distance^2, and
+    goes to zero across the planes `mirrors`, (axis, place) each.
     """
     weights, found = np.zeros(len(points)), np.zeros(points.shape)
     for places, values in surfaces:

@@ -56,11 +56,8 @@ def write_html(
     data: Mapping[str, Any],
     programs: Sequence[str],
 ) -> Path:
-    """Write a page that stands alone.
-
-    `body` is HTML with every name in it escaped, between the header with its title, plain text, and
-    the programs: JavaScript files in contactopt/figures/pages, run in this order. They read
-    `data`, anything that JSON can hold. InputError if the file cannot be written.
+    """Write a page that stands alone: a header with its title, `body` (HTML, names escaped), and
+    programs in contactopt/figures/pages, which read `data`. InputError if it cannot.
     """
     texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}
     encoded = _squeezed(json.dumps(data, allow_nan=False))

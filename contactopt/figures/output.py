@@ -118,9 +118,8 @@ def not_drawable(result: Outcome) -> str:
 
 
 def write_tables(result: Outcome, surfaces: Sequence[ContactFields], folder: Path) -> None:
-    """Write contact-PAIR.csv for every pair: one row per contact and state, units in the head.
-
-    Of a path with more than MOST_NUMBERS contacts in all states the last state alone is written.
+    """Write contact-PAIR.csv for every pair, one row per contact and state (the last state alone
+    where that is more than MOST_NUMBERS), units in the head.
     """
     scene, problem, states = result.scene, result.problem, [surfaces]
     if result.path is not None and problem.contacts * len(result.path.states) <= MOST_NUMBERS:
@@ -166,11 +165,7 @@ def _fits(path: PathResult, last: tuple[Fields, ...]) -> bool:
 
 
 def earlier_files(folder: Path) -> set[str]:
-    """Name the files that an earlier `contactopt run` wrote into a folder; none where none has run.
-
-    Its summary.json names the bodies and pairs, of which there are files beside those of fixed
-    names.
-    """
+    """The files that an earlier run wrote into a folder, by the names in its summary.json."""
     told = folder / "summary.json"
     with suppress(OSError, ValueError, TypeError, LookupError):
         summary = json.loads(told.read_text()) if told.is_file() else {}

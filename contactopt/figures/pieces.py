@@ -106,10 +106,8 @@ def outline(kind: str, elements: np.ndarray) -> np.ndarray:
 
 
 def sharp_edges(kind: str, elements: np.ndarray, points: np.ndarray, cosine: float) -> np.ndarray:
-    """The edges of a closed surface of plane elements where the normals of its two faces have a
-    smaller cosine.
-
-    points  (n, 3) places of the nodes
+    """The edges of a closed surface of plane elements with places `points` (n, 3) where the normals
+    of both faces have a smaller cosine.
     """
     edges = _edges(kind, elements)
     normals = _normals(points[elements[:, : CORNERS[kind]]])

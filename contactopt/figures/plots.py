@@ -52,11 +52,8 @@ ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """The contacts (j,) along the first direction of the surface of one pair, in order; in 3D those
-    of the row nearest to its origin.
-
-    A closed line is cut opposite to its origin, so that its places grow from -period / 2 to period
-    / 2.
+    """The contacts (j,) along the first direction of a surface, in order; in 3D of the row nearest
+    to its origin. A closed line is cut opposite to its origin.
     """
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
@@ -97,11 +94,8 @@ def _singular(scene: Scene) -> bool:
 
 
 def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
-    """Contact pressure over its mean against position over half-width (paper, figure 3), with the
-    exact curve.
-
-    The position is divided by the half-width where the contact zone lies about the origin;
-    elsewhere it is a length.
+    """Contact pressure over its mean, with the exact curve, against position, over the half-width
+    where the zone lies about the origin.
     """
     ax, (length, stress) = make_axes(ax), scene.units
     if not _in_rows(problem):
@@ -254,11 +248,8 @@ def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: A
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Draw pressure above tangential traction of one pair of surfaces, with the map of stick and
-    slip in 3D.
-
-    One panel stands above the other in the width of a journal's column. The title has a status only
-    where the problem was not solved.
+    """Pressure above tangential traction of one pair, with the map of stick and slip in 3D. The
+    title has a status where the problem was not solved.
     """
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
@@ -328,10 +319,8 @@ def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
 
 
 def refinement_figure(estimate: Estimate) -> Any:
-    """Two axes over the unknowns of each mesh: estimated errors, on logarithmic axes with the
-    target, and the value with its estimated error.
-
-    The dotted line is the last value with its estimated error added.
+    """Over the unknowns of each mesh: estimated errors with the target, and the value with its
+    estimated error. The dotted line is the last value corrected.
     """
     from matplotlib.ticker import NullFormatter
 

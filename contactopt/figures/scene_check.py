@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.accuracy.proposal import accuracy_lines
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.motions import kernel, whole_motions, work
+from contactopt.bodies.protocol import FreeMotions
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import count
 from contactopt.checks import overheard
@@ -26,6 +28,7 @@ from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.unbalanced_loads import escape, resisted, sentence
 from contactopt.readings.plausibility import doubts, said_of_meshes
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
 
@@ -69,11 +72,8 @@ class SceneCheck:
 def check_scene(
     states: Sequence[Scene], solve: dict[str, Any] | None = None, told: Sequence[str] = ()
 ) -> SceneCheck:
-    """Look at a scene without solving it. InputError for a scene that cannot be solved at all.
-
-    states  the scene, or the states of its load path, of which the last one is described
-    solve   options of the run that it is meant for: method, Q, solver
-    told    remarks that were made before, when the scene was read
+    """Look at a scene, or the last state of a load path, without solving it. `solve` are options of
+    the run (method, Q, solver), `told` earlier remarks. InputError for what cannot be solved.
     """
     scene, options = states[-1], solve or {}
     with overheard() as heard:
@@ -101,6 +101,7 @@ def check_scene(
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states; the last one is described")
     lines += _cost_lines(costs, memory, len(states))
+    lines += accuracy_lines(scene, made) if len(states) == 1 else []
     lines += [f"note: {note}" for note in notes]
     return SceneCheck(scene, made, free, costs, memory, tuple(notes), "\n".join(lines))
 
@@ -116,9 +117,8 @@ def _free_problem(scene: Scene, made: Posed) -> InterfaceProblem:
 
 
 def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
-    """The rigid motions (n, m) of an elastic body that leave supports at rest and plates level,
-    and the resultants (m,) of its loads in them. The displacement of a plate in a motion is the
-    mean of that of its nodes.
+    """The rigid motions (n, m) of an elastic body that leave supports at rest and plates level, and
+    the resultants (m,) of its loads in them.
     """
     body = assembled.body
     R, labels = whole_motions(scene.analysis, body.basis)
@@ -130,9 +130,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     return SimpleNamespace(
         name=body.name,
         at_rest=np.zeros(len(R)),
-        motions=Z,
-        motion_names=names,
-        resultants=work(Z, body.load) + (mean @ Z).T @ body.plate_forces,
+        motions=FreeMotions(Z, tuple(names), work(Z, body.load) + (mean @ Z).T @ body.plate_forces),
     )
 
 
@@ -184,7 +182,7 @@ def _direction(n: np.ndarray) -> str:
     return f"({', '.join(f'{value:.3g}' for value in np.round(n, 6) + 0.0)})"
 
 
-def _pair_lines(scene: Scene, pair: Any, own: Coupling) -> list[str]:
+def _pair_lines(scene: Scene, pair: Contact, own: Coupling) -> list[str]:
     """How the surfaces of a pair lie to each other before they are loaded."""
     length, size = scene.units[0], float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
     total = float(own.areas.sum())

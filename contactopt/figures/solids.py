@@ -21,11 +21,8 @@ BLOCK = 1_000_000  # pixels of triangles that are looked at together
 
 
 def seen_from(elevation: float, azimuth: float) -> np.ndarray:
-    """The axes of a picture, as unit vectors in the columns (3, 3): to the right, up, and towards
-    the eye. Points (..., 3) @ axes are places in the picture and distances towards the eye.
-
-    Angles are in degrees as in Matplotlib: of the eye above the x-y plane, and from the x axis
-    towards the y axis.
+    """The axes of a picture, unit vectors in the columns (3, 3): right, up, towards the eye; angles
+    [degrees] as in Matplotlib.
     """
     e, a = np.radians(elevation), np.radians(azimuth)
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
@@ -36,14 +33,9 @@ def seen_from(elevation: float, azimuth: float) -> np.ndarray:
 def picture(
     corners: np.ndarray, values: np.ndarray, lined: np.ndarray, colours: Any, pixels: int
 ) -> tuple[np.ndarray, tuple[float, float, float, float]]:
-    """Triangles as an image (h, w, 4), coloured by values that are linear on each of them, and its
-    extent (left, right, bottom, top) in the units of the corners. Its first row is below.
-
-    corners  (m, 3, 3) of the triangles as they are seen
-    values   (m, 3) at the corners
-    lined    (m, 3) whether the edge opposite to a corner is an edge of the mesh, which gets a line
-    colours  values (n,) -> colours (n, 4)
-    pixels   of the longer side of the image
+    """Triangles (m, 3, 3), as they are seen, as an image (h, w, 4), its first row below, and its
+    extent. `values` (m, 3) at the corners get `colours`; edges opposite to a corner that are
+    `lined` (m, 3) get a line; `pixels` are of the longer side.
     """
     low, high = corners[..., :2].min(axis=(0, 1)), corners[..., :2].max(axis=(0, 1))
     scale = (pixels - 2) / float((high - low).max())
@@ -68,11 +60,8 @@ def picture(
 
 
 def nearest(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """The number of the triangle that is nearest to the eye at the middle of every pixel, -1 where
-    there is none.
-
-    corners  (m, 3, 3) place in pixels and distance towards the eye;  shape  (height, width) of the
-             image
+    """The triangle nearest to the eye at every pixel of an image of this shape, -1 without one;
+    `corners` (m, 3, 3) are places in pixels and distances towards the eye.
     """
     depth = np.full(shape[0] * shape[1], -np.inf)
     owner = np.full(shape[0] * shape[1], -1)

@@ -29,9 +29,8 @@ TOP = 0.998
 
 
 def magnification(size: float, displacement: float, gaps: Sequence[np.ndarray] = ()) -> float:
-    """The factor by which displacements and the initial gaps of the pairs are drawn, for bodies of
-    a size and their largest displacement [length]: a round number of at least 1. It is 1 where the
-    gap of a pair varies, because a shape would be magnified.
+    """The round factor, at least 1, by which displacements and gaps are drawn, for bodies of a size
+    [length]; 1 where a gap varies, because a shape would be magnified.
     """
     varies = max((float(np.ptp(gap)) for gap in gaps if len(gap)), default=0.0)
     if displacement == 0 or varies > APART * displacement:
@@ -66,9 +65,8 @@ def paper_axes(
     height: float = HEIGHT,
     placed: bool = True,
 ) -> tuple[Any, np.ndarray]:
-    """A figure as wide as one column of a journal, or as two, and its axes, flat.
-
-    `height` is that of a row [inch]. Matplotlib finds the places of the axes if `placed`.
+    """A figure as wide as one column of a journal, or as two, and its axes, flat; `height` is that
+    of a row [inch]. Matplotlib finds the places of the axes if `placed`.
     """
     from matplotlib.figure import Figure
 
@@ -130,11 +128,9 @@ def add_colours(drawn: Any, ax: Any, label: str, **room: Any) -> Any:
 
 
 def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write coloured names beside the axes at the heights where their lines end, (x, y, name,
-    colour) each, as far apart as letters are high.
-
-    Places are the nearest ones in the sum of squares: isotonic regression. A dotted line leads from
-    a name to an end that is not beside it. Of equal heights the first stands above.
+    """Write coloured names beside the axes at the heights where lines end, (x, y, name, colour)
+    each, apart as letters are high: the nearest places in the sum of squares (isotonic regression).
+    A dotted line leads from a name to an end not beside it.
     """
     from scipy.optimize import isotonic_regression
 
@@ -181,10 +177,7 @@ def draw_lines(
 
 
 def save_figure(figure: Any, path: Path) -> None:
-    """Write a figure to a file, whose ending says the format.
-
-    A PNG is drawn once. Figure.savefig would draw it twice, the first time only to learn its size.
-    """
+    """Write a figure to a file. A PNG is drawn once; Figure.savefig would draw it twice."""
     import matplotlib
 
     if path.suffix != ".png":

@@ -38,11 +38,8 @@ WORDS = {
 
 
 def write_page(folder: str | Path, file: str | Path) -> Path:
-    """Write the page of a run to a file that ends in .html.
-
-    The folder holds what `contactopt run` wrote: summary.json, interface.npz, VTU files, and
-    path.npz with history.csv of a load path. InputError if the folder is not
-    that of a run.
+    """Write the page of a run, from the files that `contactopt run` wrote into its folder, to an
+    .html file. InputError if the folder is not that of a run.
     """
     folder = Path(folder)
     try:

@@ -66,10 +66,7 @@ class Table:
         while place and place not in self.lines:
             place = place[:-1]
         where = self.lines[place] if place else ""
-        return InputError(f"{self.file}{self._at(where)}: {message}")
-
-    def _at(self, where: int | str) -> str:
-        return f", line {where}" if isinstance(where, int) else f", {where}" if where else ""
+        return InputError(f"{self.file}{at_line(where)}: {message}")
 
     @contextmanager
     def about(self, *below: str | int) -> Iterator[None]:
@@ -163,6 +160,11 @@ class Table:
     def _here(self) -> str:
         names = [str(part) if isinstance(part, str) else f"[{part + 1}]" for part in self.place]
         return " in " + ".".join(names).replace(".[", "[") if names else ""
+
+
+def at_line(where: int | str) -> str:
+    """What follows the name of a file in a message: a line of it, or a change that was made."""
+    return f", line {where}" if isinstance(where, int) else f", {where}" if where else ""
 
 
 def read_table(path: Path, what: str = "scene file") -> Table:

@@ -24,10 +24,8 @@ def cores() -> int:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Let BLAS use one thread inside the block.
-
-    It is for work with many small dense products, between which further threads would only spin.
-    The limit holds for the whole process, so that one thread alone may set it at a time.
+    """Let BLAS use one thread inside the block, for many small dense products between which others
+    would spin. It holds for the process: one thread alone may set it at a time.
     """
     with threadpool_limits(1, user_api="blas"):
         yield
@@ -42,10 +40,8 @@ def give_back() -> None:
 def each(
     act: Callable[[Item], Result], items: Iterable[Item], parallel: Sequence[bool] | None = None
 ) -> tuple[Result, ...]:
-    """The results of a function for every item, in their order. The items that `parallel` marks are
-    worked on at the same time, each in a thread that ends with the call; by default all are.
-
-    An exception of one item is raised here.
+    """The results of a function for every item, in order; those that `parallel` marks (default:
+    all) at the same time, in threads. An exception of one item is raised here.
     """
     listed = list(items)
     marked = [True] * len(listed) if parallel is None else list(parallel)

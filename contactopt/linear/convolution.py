@@ -134,11 +134,9 @@ class Kernel:
         return doubled or periodic
 
     def coarse(self) -> Kernel:
-        """Make the kernel between pairs (in 2D) or squares of four contacts.
-
-        A force is spread evenly over them, and displacements are means. Along each axis K_c(I) =
-        (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4, which is a product with cos^2 followed by the sum
-        over the two frequencies that fall on one.
+        """The kernel between pairs (in 2D) or squares of four contacts, on which forces are spread
+        evenly: K_c(I) = (K(2 I - 1) + 2 K(2 I) + K(2 I + 1)) / 4 along each axis, which is a
+        product with cos^2, then the sum over the two frequencies that fall on one.
         """
         symbols = {}
         for pair, symbol in self.symbols.items():
@@ -201,11 +199,8 @@ class Kernel:
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
-    """Transform real values (n0[, n1]) on a grid, padded by zeros to (M0[, M1]), in their
-    precision.
-
-    Rows that hold nothing but padding are skipped. The transform is (M0 / 2 + 1,) in 2D and (M0, M1
-    / 2 + 1) in 3D.
+    """Transform real values on a grid, padded by zeros to (M0[, M1]), in their precision, to (M0 /
+    2 + 1,) or (M0, M1 / 2 + 1); rows of padding are skipped.
     """
     from scipy.fft import fft, rfft
 

@@ -30,9 +30,8 @@ def time_left() -> float:
 
 
 def enough() -> float:
-    """The share of its present residual that the step that runs may leave: the residual at which
-    the solve ends, over the present one. It is 0 where nobody asks for less than all digits, and
-    before the first residual is known.
+    """The residual at which the solve ends over the present one: what the step that runs may leave.
+    It is 0 where all digits are asked for, and before a residual is known.
     """
     return _enough.get()
 

@@ -23,11 +23,8 @@ Act = Callable[[Any], Any]
 
 
 def flexible_gmres(product: Act, inverse: Act, right: Vector, weights: Vector, rtol: float) -> Any:
-    """Solve A x = b by GMRES with a preconditioner that may change, to |W (b - A x)| <= rtol |W b|
-    with W = diag(weights).
-
-    `inverse` approximates A^-1. The right side b and the positive weights are both arrays (n,) or
-    both Stacked. The best x after RUNS runs of RESTART iterations comes back.
+    """Solve A x = b by GMRES with a preconditioner `inverse` that may change, to |W (b - A x)| <=
+    rtol |W b| with W = diag(weights); x after RUNS runs of RESTART iterations at most.
     """
     x, residual = 0.0 * right, right
     goal = rtol * norm(weights * right)

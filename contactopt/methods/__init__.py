@@ -28,11 +28,7 @@ if TYPE_CHECKING:
 
 
 class Repeated(Exception):
-    """Thrown by the driver into `iterate` where it yields, because its iterates come back to
-    earlier ones.
-
-    A method that has another way to go on catches it. All others end.
-    """
+    """Thrown into `iterate` because its iterates repeat. A method that has another way goes on."""
 
 
 class NoSolution(Exception):
@@ -78,7 +74,7 @@ METHODS = {
 }
 
 
-def solves(method: Any, law: Law) -> bool:
+def solves(method: Method, law: Law) -> bool:
     """Whether a method solves problems of a law, in the variables in which methods see the law
     (`Law.plain`). One that says nothing about it solves all.
     """

@@ -72,10 +72,10 @@ class TwoStage(Method):
 class Alternating(TwoStage):
     """The alternating iteration of the paper: a normal and a tangential convex program in turn.
 
-    `normal` and `tangential` name the backends of the two programs; without a name the tangential
-    one is proxqp for intervals and clarabel for discs. `relaxation` is the fraction of each new
-    tangential force that is taken, above 0 and at most 1. `preconditioner` is that of the backend
-    'pcg', which needs products with Q only.
+    `normal` and `tangential` name the backends; by default the tangential one is proxqp for
+    intervals, clarabel for discs. `relaxation`, in (0, 1], is the fraction of a new tangential
+    force that is taken. `preconditioner` is that of the backend 'pcg', which needs products with Q
+    only.
     """
 
     normal: str = "proxqp"

@@ -34,10 +34,7 @@ INNER = 2000  # products with Q in one subproblem
 
 @dataclass(frozen=True)
 class APG(Method):
-    """Accelerated projected gradients.
-
-    There are no settings: the step follows from the largest eigenvalue of Q.
-    """
+    """Accelerated projected gradients. The step follows from the largest eigenvalue of Q."""
 
     sparse: ClassVar[bool] = True  # takes a sparse Q
 

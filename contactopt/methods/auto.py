@@ -74,10 +74,8 @@ NO_PROGRESS_JAMMED = (
 
 @dataclass(frozen=True)
 class Auto(Method):
-    """The default method. It has no number to choose.
-
-    `preconditioner` is that of Newton's steps where Q is known by its products: a name in
-    contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
+    """The default method. `preconditioner` is that of Newton's steps where Q is known by its
+    products: a name, 'none', or None for the best that fits the contacts.
     """
 
     preconditioner: str | None = None
@@ -310,10 +308,9 @@ class _Robust:
 def _newton(
     problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
 ) -> Generator[Iterate | Known, None, Iterate]:
-    """Newton's iterates; returns the best.
-
-    What comes next needs the entries of Q. Where these are dear, Newton's method goes on until its
-    own products have cost as much. A start that leads nowhere is given up for the bonded solution.
+    """Newton's iterates; returns the best. Where the entries of Q, which the next stages need, are
+    dear, it goes on until its products have cost as much. After a start that leads nowhere it
+    begins anew at the bonded solution.
     """
     Q = problem.Q
     dear = not has_entries(Q) and (Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES)
@@ -340,10 +337,8 @@ def _newton(
 def _followed(
     points: Iterator[tuple[Iterate | Known, float]], tired: Callable[[int, int], bool]
 ) -> Generator[Iterate | Known, None, tuple[Iterate | None, float]]:
-    """Hand points on until a stage is tired or repeats itself; returns the best point and its
-    residual.
-
-    tired  of the number of points so far, and of how many of them came since the last progress
+    """Hand points on until a stage repeats itself or is `tired`, a function of the number of points
+    and of those since the last progress; returns the best point and its residual.
     """
     best, reached, since, seen = np.inf, None, 0, np.zeros(0)
     for steps, (point, residual) in enumerate(points, start=1):

@@ -39,10 +39,7 @@ PIVOT, TIE = 1e-10, 1e-12  # least pivot; relative distance of equal ratios
 
 @dataclass(frozen=True)
 class Lemke(Method):
-    """Lemke's method on the linear complementarity problem, for plane problems. It has no settings.
-
-    It raises InputError in 3D and for more than 300 contacts.
-    """
+    """Lemke's method. InputError in 3D and for more than 300 contacts."""
 
     def solves(self, law: Law) -> bool:
         return law.unilateral and law.proportional and not law.dilatant
@@ -75,10 +72,9 @@ class Lemke(Method):
 def complementarity_problem(
     problem: InterfaceProblem, copositive: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A problem of k contacts in 2D as an LCP  0 <= z, M z + q >= 0, z'(M z + q) = 0.
-
-    `copositive` chooses the form with 4 k unknowns. Returns M (m, m), q (m,) and C (2 k, c) with r
-    = C z[:c]; lambda is last in z.
+    """A plane problem of k contacts as 0 <= z, M z + q >= 0, z'(M z + q) = 0; `copositive` chooses
+    the form with 4 k unknowns. Returns M (m, m), q (m,) and C (2 k, c) with r = C z[:c]; lambda is
+    last in z.
     """
     k, p = problem.contacts, len(problem.s)
     normal, tangent, eye = np.eye(2 * k)[:, ::2], np.eye(2 * k)[:, 1::2], np.eye(k)

@@ -73,10 +73,7 @@ class AcaryCadoux(Method):
 
 @dataclass(frozen=True)
 class Relaxation(AcaryCadoux):
-    """One cone program, whose solution is that of associated friction.
-
-    It has the settings of AcaryCadoux.
-    """
+    """One cone program, whose solution is that of associated friction."""
 
     def iterate(self, problem: InterfaceProblem, start: Iterate | None = None) -> Iterator[Iterate]:
         return islice(super().iterate(problem), 1)

@@ -239,8 +239,7 @@ def _next(
     steps: Iterator[Iterate | Known], left: float, repeated: Status | None, enough: float
 ) -> tuple[Iterate | Known | None, Status | None, str, Infeasible | None]:
     """The next iterate with `left` seconds to go, or how and why the iteration ended, with a proof
-    if there is no solution. `repeated` says how the last iterates repeat earlier ones, and `enough`
-    what share of the residual may be left.
+    if there is no solution. `enough` is the share of the residual that may be left.
     """
     try:
         # what overflows is seen below
@@ -288,10 +287,8 @@ def _without_contacts(problem: InterfaceProblem, method: Method, tol: float) -> 
 
 
 class _Recorder:
-    """Certificate, history and stopping rule of one solve.
-
-    clock counts the method's own seconds, certified those of the certificate. Without an iterate
-    the answer is the dimensionless point `first`. An iterate that is `lost` is none.
+    """Certificate, history and stopping rule of one solve. Without an iterate the answer is
+    `first`.
     """
 
     def __init__(self, problem: InterfaceProblem, scales: Scales, limits: _Limits, first: Iterate):
@@ -349,7 +346,7 @@ class _Recorder:
         if self.lengthless:
             # The same forces solve the problem with u = V lambda = 0, and rounding has no length to
             # be small beside.
-            self.multipliers = np.zeros(len(lam))
+            self.multipliers = np.zeros(len(self.problem.s))
         self.certify(known)
         change = _relative(self.reactions[:, 1:], previous[:, 1:])
         state = np.concatenate([r.ravel(), lam])

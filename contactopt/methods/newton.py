@@ -51,10 +51,9 @@ SHARP = 1e-4  # accuracy of a residual, over the residual that the step aimed at
 class Newton(Method):
     """Newton's method on the equations of Alart and Curnier.
 
-    `linear` is 'dense', 'krylov', which needs products with Q only, or 'coupled', which iterates on
-    the bodies at once. None: dense for an array Q, coupled where the bodies are solved by
-    iteration, and krylov for other operators. `preconditioner` of the last two is a name in
-    contactopt.methods.preconditioners, or 'none'. None: the best that fits the contacts.
+    `linear` is 'dense', 'krylov' (products with Q only) or 'coupled' (iterates on the bodies at
+    once). None: dense for an array Q, coupled where bodies are solved by iteration, else krylov.
+    `preconditioner` of the last two is a name, 'none', or None for the best that fits.
     """
 
     linear: str | None = None

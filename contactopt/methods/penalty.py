@@ -35,11 +35,8 @@ EXACT = 1e-3
 
 @dataclass(frozen=True)
 class Penalty(Method):
-    """The penalty method. The regularised problem is solved by `auto`.
-
-    `factor` is the stiffness of the penalty of each node, in units of one over the mean compliance;
-    the default makes a certificate of about 1e-6. `tangential_factor` is the same along the
-    surface. None: friction is exact.
+    """The penalty method. `factor` is the stiffness of the penalty of each node, over the mean
+    compliance, `tangential_factor` that along the surface; None: friction is exact.
     """
 
     factor: float = 1e6

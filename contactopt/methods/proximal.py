@@ -55,12 +55,10 @@ class Proximal(Method):
 def proximal_iterates(
     problem: InterfaceProblem, matrix: Blocks, point: Iterate, alpha: float, pace: Pace = "steady"
 ) -> Iterator[Iterate]:
-    """The solution of one proximal subproblem after another, or of a failed one the point that
-    Newton's method left it at. `matrix` is the problem's Q, ready for block systems.
-
-    `alpha` is the first weight of the proximal term. It changes slowly at the pace `gentle`, so
-    that few subproblems fail: for problems on which every smaller alpha soon fails. The loop of the
-    pace `eager` ends with the first subproblem that is not solved in few steps.
+    """The solution of one proximal subproblem after another, or of a failed one the point at which
+    Newton's method ended. `alpha` is the first weight of the proximal term. The pace `gentle` is
+    for problems on which every smaller alpha soon fails; the pace `eager` ends with the first
+    failure.
     """
     fall, rise, easy, most = {
         "steady": (

@@ -36,9 +36,8 @@ from contactopt.problem.laws.law import Law
 class Tresca(Method):
     """The fixed point of Tresca: convex programs with friction bounds of the solution before.
 
-    `backend` names the QP backend in 2D and the conic backend in 3D. None: proxqp and clarabel.
-    `relaxation` is the fraction of each change of the friction bounds that is taken, above 0 and at
-    most 1.
+    `backend` names the QP backend in 2D, the conic one in 3D (None: proxqp, clarabel).
+    `relaxation`, in (0, 1], is the fraction of each change of the friction bounds that is taken.
     """
 
     backend: str | None = None

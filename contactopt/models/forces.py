@@ -265,11 +265,8 @@ def _friction(
     problem: InterfaceProblem, r_t: object, g: object, facets: int | None
 ) -> tuple[Any, Reader, Reader]:
     """|t_i| <= g_i for r_t (k d,), the reader of the slip u_t (k, d) and that of the multiplier of
-    g (k,).
-
-    t is r_t itself or, where friction depends on the direction, what `Law.stretch` makes of it.
-    Intervals are polygons with two facets. Polygons are inscribed: they never allow more friction
-    than the disc.
+    g (k,). t is r_t, or what `Law.stretch` makes of it. Polygons with so many facets are inscribed;
+    intervals have two.
     """
     k = problem.contacts
     back = problem.law.stretch(problem.dim)

@@ -70,6 +70,7 @@ DUST = 1e-5  # share of the force that closes the gaps below which forces are ro
 UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
 # rounding of r - rho u, over r, and how many times F the forces are from where on it counts
 ROUNDING, UNSEEN = 2.0**-52, 1e4
+CANCELLED = 4 * ROUNDING  # share of a gap, up to which what a motion leaves of it is none
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
@@ -132,7 +133,10 @@ def natural_map_residual(
     if len(r) == 0:
         return balance_residual(problem, r)
     d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
-    w = problem.q + (problem.V @ lam).reshape(r.shape) if len(lam) else problem.q
+    w = problem.q
+    if len(lam):
+        w = w + (problem.V @ lam).reshape(r.shape)
+        w[np.abs(w) <= CANCELLED * np.abs(problem.q)] = 0.0
     u = d + w
     measure = yardsticks(problem, r, d, w)
     beyond = lengths(r[:, 1:]) - problem.law.bound_along(r)
@@ -220,14 +224,12 @@ def balance_residual(
 def amplification(
     problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray
 ) -> float:
-    """Bound the relative error |dr_i| / F of forces by this many times their certificate, to first
-    order: it is the condition of the solution, and infinite if the forces are not unique.
+    """How many times the certificate bounds |dr_i| / F of forces, to first order: the condition of
+    the solution, infinite if the forces are not unique.
 
-    The derivative of the natural map and of the balance by r and lambda is M = [[I - D + D rho Q, D
-    rho V], [V', 0]], D that of P. The certificate bounds every block of M (dr, dlambda), so that
-    the largest sum of norms in a row of blocks of M^-1 bounds dr. Motions that no force feels are
-    left out. It is meant near a solution at which no contact is between two states, and needs the
-    entries of Q.
+    The derivative of natural map and balance is M = [[I - D + D rho Q, D rho V], [V', 0]], D that
+    of P. The certificate bounds every block of M (dr, dlambda), so the largest sum of norms in a
+    block row of M^-1 bounds dr. It needs the entries of Q, and no contact between two states.
     """
     r, (k, dim) = np.asarray(reactions, dtype=float), problem.q.shape
     if k == 0:
@@ -292,9 +294,8 @@ def siconos_residual(
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """The multipliers (p,) that fit reactions best, by least squares on the components whose
-    displacement must vanish: u_n where the law says pressed, and u_t where it says sticking. They
-    are zeros where no displacement must vanish.
+    """The multipliers (p,) that fit reactions best: least squares on u_n where pressed, u_t where
+    sticking; zeros where no displacement must vanish.
     """
     r = np.asarray(reactions, dtype=float)
     rows = np.repeat(problem.law.sticking(r)[:, None], problem.dim, axis=1)

@@ -51,12 +51,8 @@ class Chart:
 
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
-        """Lay a chart through bare points (d, k) [length], of which nothing else is known, open and
-        without symmetry.
-
-        Coordinates that are given on the surface already, d = dim - 1, are taken as they are.
-        Otherwise the origin is the middle of the points, the axes are their principal directions,
-        and the sign of each makes its largest component in space positive.
+        """Lay a chart through bare points (d, k) [length]: as they are if d = dim - 1, else from
+        their middle along principal directions, whose largest components are positive.
         """
         count = dim - 1
         if len(coordinates) <= count:
@@ -78,10 +74,8 @@ class Chart:
         return np.argsort(self.places[0], kind="stable")
 
     def images(self) -> tuple[np.ndarray, np.ndarray]:
-        """The places (dim - 1, m) [length] of the whole surface, with those of all mirror images,
-        and the contact (m,) of each.
-
-        A contact on a plane of symmetry or on an axis is its own image and stands there once.
+        """The places (dim - 1, m) [length] of the whole surface with all mirror images, and the
+        contact (m,) of each; a contact on a plane or axis stands there once.
         """
         x, contact = self.places, np.arange(self.places.shape[1])
         near = ON_PLANE * np.abs(x).max(initial=0.0)
@@ -128,12 +122,8 @@ class Pair:
 
 
 def nodal_weights(chart: Chart, areas: np.ndarray) -> np.ndarray:
-    """Compute positive weights w (k,) of the contacts with diag(Q) about proportional to 1 / w^2,
-    scaled so that the mean of w^2 is one.
-
-    A force that is spread over the area of a node makes a displacement proportional to 1 / length
-    of the contact line there (2D), or to 1 / square root of the area (3D). Therefore w^2 = area /
-    spacing on a line, sqrt(area) on a surface.
+    """Positive w (k,) with diag(Q) about proportional to 1 / w^2 and mean w^2 = 1: a force spread
+    over a node displaces like 1 / length (2D), 1 / sqrt(area) (3D).
     """
     if len(chart.places) == 2:
         square = np.sqrt(areas)

@@ -118,11 +118,9 @@ def disc_of_height(
 
 
 def coulomb_cone_derivative(y: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, dim) on Coulomb's cones, and its generalised derivative (k, dim, dim).
-
-    The derivative is the identity inside the cone and zero in its polar. Between them the nearest
-    point is h (1, mu unit) with h = (y_n + mu |y_t|) / (1 + mu^2). The derivative projects on that
-    ray and shrinks what is tangent to the disc.
+    """Projection of y (k, dim) on Coulomb's cones, and its generalised derivative (k, dim, dim):
+    identity inside, zero in the polar. Between them the nearest point is h (1, mu unit), h = (y_n +
+    mu |y_t|) / (1 + mu^2), and the derivative projects on that ray and shrinks what is tangent.
     """
     k, dim = y.shape
     n, t = split(y)

@@ -24,10 +24,6 @@ class ContactStatus:
 
 
 def contact_status(problem: InterfaceProblem, reactions: np.ndarray) -> ContactStatus:
-    """Which contacts are open, which stick and which slip under given reactions: three masks (k,),
-    of which exactly one is True at each contact.
-
-    The law of the problem decides, with its own tolerances (contactopt.problem.laws).
-    """
+    """Which contacts are open, stick or slip: three masks (k,), of which one is True each."""
     touching, stick = problem.law.pressed(reactions), problem.law.sticking(reactions)
     return ContactStatus(~touching, stick, touching & ~stick)

@@ -55,12 +55,9 @@ class Infeasible:
 
 
 def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infeasible | None:
-    """Look for a proof that a problem has no solution; None says nothing. The linear program takes
-    `time_limit` [s] at most.
-
-    Laws without a cone of forces, operators, and programs of more than MOST_ENTRIES entries are not
-    looked at. A positive definite Q without a plate needs no search: every such problem has a
-    solution.
+    """Look for a proof, in at most `time_limit` [s], that a problem has no solution; None says
+    nothing. Laws without a cone, operators and more than MOST_ENTRIES entries are not looked at; a
+    positive definite Q without a plate always has a solution.
     """
     if (apart := held_apart(problem)) is not None:
         return apart

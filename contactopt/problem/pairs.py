@@ -38,12 +38,8 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
 def alone(
     problem: InterfaceProblem, solution: Solution, pair: Pair
 ) -> tuple[InterfaceProblem, Solution]:
-    """One pair of surfaces alone, with the forces of all other pairs as they are in the solution:
-    its problem, and the solution with its reactions (k_i, dim).
-
-    The displacements of the pair are the same functions of its own forces, and the loads are those
-    that the solution's forces on the pair balance. A solution of the whole problem therefore gives
-    one of this problem. Where there is one pair only, both are returned as they are.
+    """One pair of surfaces alone, its problem and solution, under the forces of all other pairs as
+    they are in the solution. Where there is one pair, both as they are.
     """
     if len(problem.pairs) == 1:
         return problem, solution

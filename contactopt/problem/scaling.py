@@ -80,13 +80,10 @@ def isotropic(problem: InterfaceProblem) -> InterfaceProblem:
 
 def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the
-    columns of V have length one. The Scales take its reactions and multipliers back.
+    columns of V have length one, in all units alike. The Scales take its answers back.
 
-    The force scale is the mean force that the balance asks of a node or, without a balance, the
-    force that removes the root-mean-square overlap at one node. Gaps, however wide, do not count.
-    Every change of units of the input gives the same numbers here. A component that cannot move (on
-    a symmetry plane, say) carries no force that matters: a unit compliance there makes that force
-    zero instead of undetermined.
+    The force scale is the mean force that the balance asks of a node or, without a balance, that
+    which removes the root-mean-square overlap. Components that cannot move get a unit compliance.
     """
     scales, held = scales_of(problem), immovable(problem)
     compliance, columns = scales.length / scales.force, scales.length / scales.multipliers
@@ -137,14 +134,21 @@ def without_rounding(V: np.ndarray) -> np.ndarray:
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """The components (k dim,) that neither forces nor multipliers nor q move, as a mask."""
-    d = np.abs(diagonal(problem.Q))
+    """The components (k dim,) that neither forces nor multipliers nor q move, and whose forces move
+    nothing, as a mask. A normal force that bounds the friction of a component that moves is none of
+    them: it matters.
+    """
+    d, law = np.abs(diagonal(problem.Q)), problem.law
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
     if held.any() and has_entries(problem.Q):
-        rows = np.flatnonzero(held)
-        held[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
-    return held
+        for entries in (problem.Q, problem.Q.T):  # which differ where Q is unsymmetric
+            rows = np.flatnonzero(held)
+            own = sp.csr_array(entries[rows]) if sp.issparse(entries) else entries[rows]
+            held[rows] = row_sizes(own) <= NOISE * d.max(initial=0.0)
+    held = held.reshape(problem.q.shape)
+    held[:, 0] &= held[:, 1:].all(axis=1) | ~law.rough | (not law.proportional)
+    return held.ravel()
 
 
 def _closing(problem: InterfaceProblem) -> float:

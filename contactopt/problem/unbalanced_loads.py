@@ -55,9 +55,8 @@ class Escape:
 
 
 def escape(problem: InterfaceProblem) -> Escape | None:
-    """Find a motion along which the loads drive the bodies away from all contacts, or None.
-
-    Where the bound of friction is neither given nor mu r_n, only motions count that do not slide.
+    """A motion along which the loads drive the bodies away from all contacts, or None; only one
+    that does not slide where the bound of friction is neither given nor mu r_n.
     """
     if not np.any(problem.s):
         return None
@@ -94,9 +93,8 @@ def _described(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> 
 
 
 def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Bases of the motions that contacts resist (p, m) and of those (p, f) that nothing resists,
-    orthogonal to each other: they move no contact along its normal, and none along its surface
-    where it can rub.
+    """Bases, orthogonal to each other, of the motions that contacts resist (p, m) and that nothing
+    resists (p, f).
     """
     resists = np.repeat(problem.law.rough[:, None], problem.dim, axis=1)
     resists[:, 0] = True

@@ -135,9 +135,8 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
 def on_nodes(
     reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
 ) -> tuple[Fields, ...]:
-    """Put the contact quantities of the pairs on the nodes of the bodies' contact surfaces, beside
-    their displacements and stresses. They are zero at all other nodes. A node takes the values of
-    the contact nearest to it. Traction and slip of a lower body have the opposite sign.
+    """Put the contact quantities on the nodes of the contact surfaces, each that of the nearest
+    contact, zero elsewhere. Traction and slip of a lower body have the opposite sign.
     """
     default = {part.name: getattr(part, "contact", None) for part in reduction.scene.parts}
     made = []

@@ -16,8 +16,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.bodies.fields import Region
+from contactopt.bodies.views import stress_map
 from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import straight
@@ -32,10 +34,7 @@ THERE = 0.05  # of the distance of contacts, within which a node is at the place
 
 
 def infinite(reduction: Reduction, solution: Solution, reading: Reading) -> str:
-    """One sentence if the largest value of a reading lies where it is infinite, or an empty text.
-
-    The reading belongs to the scene, with contacts numbered as there.
-    """
+    """One sentence if the largest value of a reading is where it is infinite, else nothing."""
     if not reading.peaks or not solution.solved:
         return ""
     peak = reading.peaks[0]
@@ -62,7 +61,7 @@ def corner_remarks(reduction: Reduction, solution: Solution) -> list[str]:
 
 def at_re_entrant(reduction: Reduction, peak: Peak) -> bool:
     """Whether a peak of the stress lies at a re-entrant corner of its body."""
-    read = reduction.bodies[peak.body].stress_map(Region())
+    read = stress_map(reduction.bodies[peak.body], Region())
     if read is None:
         return False
     mesh = straight(read.mesh)
@@ -104,12 +103,9 @@ def _share(part: Any, scene: Any, place: np.ndarray, reach: float) -> float:
     return filled(cells, vertex) if away[vertex] <= reach else 0.5
 
 
-def re_entrant(mesh: Any, vertex: int) -> bool:
-    """Whether a vertex, or one within two elements of it, is at a re-entrant corner of the body or
-    on such an edge.
-
-    The recovered stress at the corner itself looks from all sides, and may be less than that next
-    to it.
+def re_entrant(mesh: Mesh, vertex: int) -> bool:
+    """Whether a vertex, or one within two elements of it, is at a re-entrant corner or edge. (The
+    recovered stress at the corner itself may be less than that next to it.)
     """
     cells = simplices(mesh)
     near = np.array([vertex])

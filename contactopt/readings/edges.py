@@ -57,10 +57,8 @@ Reader = Callable[[End], Read | None]
 
 
 def contact_area(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
-    """The area on which one pair of surfaces touches, of all mirror images together, around the
-    whole axis, or over the thickness in plane strain [length^2].
-
-    It is that of the zone whose half-width is read, or of the nodes that touch.
+    """The area on which one pair of surfaces touches, with all mirror images, around the axis or
+    over the thickness [length^2]: of the zone whose half-width is read, or of the nodes that touch.
     """
     counted = float(problem.areas[contact_status(problem, reactions).touching].sum())
     width = contact_edge(scene, problem, reactions)
@@ -97,18 +95,15 @@ def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
 def contact_zone(
     scene: Scene, problem: InterfaceProblem, reactions: np.ndarray
 ) -> tuple[float, float]:
-    """Read the half-width of the contact zone of one pair of surfaces, and its uncertainty
-    [length]; both are 0 without contact.
+    """Read the half-width of the contact zone of one pair, and its uncertainty [length]; 0 without
+    contact.
 
-    Where contact ends by itself on a line, its edge is the zero of a root times a polynomial, which
-    fit the pressure over the outer part of the half-width, without the last two nodes. On a
-    surface, where too few nodes are left, and where the other end is a corner, a straight line
-    through p^2 against x^2 goes through the rings of nodes next to the edge. Where every node
-    touches, or where contact ends at a corner, the edge is that of the contact surface. A reading
-    on a surface counts only where the disc of that radius has the area of the zone to within an
-    element. The uncertainty is half of what the fit and the straight line differ, and a share of an
-    element at least. Where areas of nodes are counted, it is that of the nodes at the edge, and
-    nothing where the pressure does not fall towards the ends of a line.
+    Where contact ends by itself on a line, its edge is the zero of a root times a polynomial that
+    fit the outer pressure without the last two nodes; on a surface, or beside a corner, that of a
+    straight line through p^2 against x^2 next to the edge. Where every node touches, the edge is
+    that of the surface. A disc counts only with the area of the zone to within an element, else
+    nodal areas do. The uncertainty is half of what fit and line differ, at least a share of an
+    element; of nodal areas that of the nodes at the edge.
     """
     touching = contact_status(problem, reactions).touching
     pressure = reactions[:, 0] / problem.areas
@@ -146,16 +141,13 @@ def stick_edge(
     slip: np.ndarray | None = None,
     zone: Read | None = None,
 ) -> Read:
-    """Read the half-width of the stick zone of one pair of surfaces, and its uncertainty [length].
-    `zone` is that of contact, where it is known already.
+    """Read the half-width of the stick zone of one pair, and its uncertainty [length]; `zone` is
+    that of contact, where known.
 
     The slack of the friction bound counts towards the direction in which the nearest slipping node
-    slips. Where contact ends at a corner, the pressure is singular: the slack relative to its bound
-    stays smooth but not straight. The values nearest to the edge then serve best, and the edge is
-    the mean of what the slack inside and the slip outside read, where `slip` (k, dim - 1) is known:
-    the tangential motion of the step that led to the reactions [length]. It is as uncertain as they
-    differ. A reading that is off by more than an element is left out, which happens to the slip of
-    small steps of a load path.
+    slips. Where contact ends at a corner, the slack over its bound is smooth but not straight: the
+    edge is the mean of what the slack inside and the `slip` (k, dim - 1) of the last step outside
+    read, as uncertain as they differ. A reading off by more than an element is left out.
     """
     status = contact_status(problem, reactions)
     if not status.stick.any():  # or on less than what belongs to one contact
@@ -199,11 +191,8 @@ def _half_width(
     read: Reader,
     least: float,
 ) -> tuple[float, float]:
-    """Half-width of the zone of the contacts `inside`, from the readings of its ends, and its
-    uncertainty [length].
-
-    weights  (k,) by which the centre of a zone on a surface is averaged
-    least    uncertainty of a reading, in elements
+    """Half-width of the zone `inside`, from the readings of its ends, and its uncertainty, at least
+    `least` elements. `weights` (k,) average the centre of a zone on a surface.
     """
     area = float(problem.areas[inside].sum())
     counted = scene.analysis.half_width(area, scene.thickness)
@@ -230,10 +219,8 @@ def _half_width(
 
 
 def _at_centroids(end: End, scene: Scene) -> End:
-    """The end with every contact on a line where the shape function of its node has its centroid.
-
-    That of a linear function between elements of lengths l and m is (m - l) / 3 beyond the node.
-    Quadratic functions have theirs at the nodes.
+    """The end with contacts on a line moved to the centroids of their shape functions, (m - l) / 3
+    beyond a node between linear elements of lengths l and m.
     """
     if scene.degree != 1 or scene.dim == 3:
         return end
@@ -244,10 +231,8 @@ def _at_centroids(end: End, scene: Scene) -> End:
 
 
 def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
-    """Where sqrt(c^2 - x^2) times a polynomial in x is zero, fitted to the pressure over an outer
-    share of the half-width; None without such a fit. Of all shares and degrees the fit with the
-    least standard error of c counts: a degree that is too low leaves a rest, and a high one has few
-    nodes for each number.
+    """The zero of sqrt(c^2 - x^2) times a polynomial, fitted to the pressure over that outer share
+    and of that degree with the least standard error of c; None without such a fit.
     """
     last = end.distance[end.inside].max()
     if np.sum(end.inside) <= OUTER:  # one contact alone may be at the centre
@@ -268,9 +253,8 @@ def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float
 def _fitted_root(
     x: np.ndarray, p: np.ndarray, weights: np.ndarray, degree: int, far: float
 ) -> tuple[float, float]:
-    """The standard error of c, and c, at which sqrt(c^2 - x^2) times a polynomial of a degree fits
-    values p best, by the method of Gauss and Newton for c^2; infinity and nan where c is beyond
-    `far`.
+    """The standard error of c, and c, of the best fit of sqrt(c^2 - x^2) times a polynomial, by
+    Gauss and Newton for c^2; infinity and nan where c is beyond `far`.
     """
     none, square = (np.inf, np.nan), (1 + far) ** 2 / 4
     basis = chebvander(2 * (x - x.min()) / np.ptp(x) - 1, degree) * weights[:, None]

@@ -75,10 +75,8 @@ def pressure_distribution(
 
 
 def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
-    """The stiffness of the present contacts against relative motions of the bodies, (dim, dim)
-    along n, t1[, t2] [force / length]; zeros without contact. It is made of the forces that a small
-    motion adds if no contact opens, closes or changes between stick and slip. Contacts that slip
-    take part with their normal components.
+    """The stiffness of the present contacts against relative motions, (dim, dim) along n, t1[, t2]
+    [force / length], if no contact changes its state; slipping ones count normally only.
     """
     status = contact_status(problem, solution.reactions)
     takes_part = np.repeat(status.stick[:, None], problem.dim, axis=1)
@@ -95,11 +93,8 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
 
 
 def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarray]:
-    """Maps of the contact quantities on the grid of a half-space's (n0[, n1]) points.
-
-    'pressure' (n0[, n1]) and 'traction' (n0[, n1], dim - 1) on the upper body [stress]; 'gap' (n0[,
-    n1]) and 'slip' (n0[, n1], dim - 1) [length]; and 'status' (n0[, n1]), which is 0 where open, 1
-    where sticking and 2 where slipping. InputError if the scene has no half-space.
+    """Pressure, traction, gap, slip and status (0 open, 1 stick, 2 slip) on the grid (n0[, n1]) of
+    a half-space. InputError if the scene has none.
     """
     found = [body for body in reduction.bodies if isinstance(body, HalfSpaceBody)]
     if not found:

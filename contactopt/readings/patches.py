@@ -116,10 +116,8 @@ class Patch:
     chart: Chart
 
     def measure(self, read: Callable[[End], tuple[float, float] | None]) -> Ends | None:
-        """The ends of the patch from the readings of each; None where one of them cannot be read.
-
-        An end at the end of the contact surface is the place of the last node. The centre, from
-        which readings count distances, is half-way between the ends, hence the iteration.
+        """The ends of the patch from the readings of each; None where one cannot be read. Readings
+        count from the centre half-way between the ends, hence the iteration.
         """
         x = self.place[self.inside]
         first, last, uncertainty = float(x.min()), float(x.max()), 0.0
@@ -179,9 +177,8 @@ def least(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
-    """The connected patches of a zone on the contact surface of one pair, where some contacts are
-    `inside` (k,), but not all: in their order along a contact line. On a surface one disc about the
-    mean place of the contacts inside with their weights (k,), or none where the zone is no disc.
+    """The connected patches of a zone `inside` (k,), in their order along a contact line. On a
+    surface one disc about its mean place by `weights` (k,), or none where it is no disc.
     """
     if problem.dim == 3:
         disc = _disc(problem, inside, weights)
@@ -207,11 +204,8 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
 
 
 def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
-    """Whether a patch and its mirror image are one: no contact lies between them, but for one on
-    the plane itself.
-
-    The contact on an axis of revolution has no area, hence perhaps no force, and does not divide
-    them.
+    """Whether a patch and its mirror image are one: no contact lies between them but one on the
+    plane. (That on an axis of revolution has no area, perhaps no force, and does not divide them.)
     """
     plane = ON_PLANE * np.abs(place).max()
     off_plane = np.abs(place[np.abs(place) > plane])

@@ -67,16 +67,12 @@ class Reading:
 
 
 def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
-    """Read the largest pressure of one pair of surfaces from a local fit around the node where it
-    is largest [stress].
+    """Read the largest pressure of one pair of surfaces [stress].
 
-    The square of the pressure is quadratic under Hertz's ellipse, and near the top of any smooth
-    pressure. A quadratic polynomial is fitted to it through the few nodes around every local
-    maximum of the nodal pressures, with the nodal areas as weights. What the nodes scatter about
-    the fit is the uncertainty, so that the reading agrees with the nodal values within its own
-    error. Nodes on the axis of an axisymmetric mesh are left out: the strain u_r / r is poorly
-    resolved there, on a ring without area; unless no other node is pressed. At the rim of the
-    contact surface the nodal value is returned.
+    The square of the pressure is quadratic under Hertz's ellipse and near any smooth top: it is
+    fitted to the few nodes around every local maximum, by nodal areas. What nodes scatter about the
+    fit is the uncertainty. Nodes on an axis are left out, since u_r / r is poorly resolved there.
+    At the rim the nodal value counts.
     """
     problem = reduction.problem
     pressure = nodal_pressure(problem, solution)
@@ -113,9 +109,8 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
 
 
 def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:
-    """Numbers of the places whose size (k,) is the largest one (k,) around them, those of the
-    largest size first, MOST_PEAKS at most. Rounding, and with it the unit of length, does not
-    choose among equal ones.
+    """Numbers of the places whose size (k,) is the largest one around them, MOST_PEAKS at most, the
+    largest first. Rounding does not choose among equal ones.
     """
     chosen = np.flatnonzero(sizes >= (1 - EQUAL) * largest)
     order = np.round(sizes[chosen] / (EQUAL * sizes.max(initial=0.0) or 1.0))
@@ -148,13 +143,10 @@ def _fitted_top(
 ) -> Peak:
     """The peak of the pressure near a node.
 
-    Linear elements of size h have an error of about h / m^2 of the pressure on the m-th ring around
-    an axis, because u_z / h^2 of their nodes grows there like log m, which the nodes of the contact
-    surface, held at its gap, cannot follow. It is of first order, but smooth enough for a narrow
-    fit to follow it. Beside an axis the value is therefore that of the widest of fits, each twice
-    as wide as the one before, until it changes by more than it did the last time: what the rings
-    spoil fades with the width, and what the pressure lacks of an ellipse grows. A fit to m times as
-    many contacts is sqrt(m) times less uncertain than its contacts scatter.
+    Linear elements err by about h / m^2 of the pressure on the m-th ring around an axis: u_z / h^2
+    grows there like log m, which nodes held at their gap cannot follow. Beside an axis fits are
+    therefore widened twofold until the value changes by more than it did the last time: what the
+    rings spoil fades with the width, and what the pressure lacks of an ellipse grows.
     """
     count, widest = FITTED[problem.dim], 0
     if np.any((problem.areas > 0) & ~usable):  # nodes on an axis, whose neighbours are poor, too
@@ -188,11 +180,9 @@ def _same_side(chart: Chart, contact: int) -> np.ndarray:
 def _fit_to(
     count: int, problem: InterfaceProblem, pressure: np.ndarray, usable: np.ndarray, top: int
 ) -> Peak:
-    """As _fitted_top, from a quadratic fit to the square of the pressure at `count` contacts.
-
-    The uncertainty is infinite where these are too few, or not all pressed. With the fit linear in
-    the squares, and with a place where its slope is zero or which is a node, the derivative of the
-    value v by a square is half the weight that it has in v^2 over v.
+    """As _fitted_top, from a quadratic fit to the square of the pressure at `count` contacts;
+    infinitely uncertain if these are too few or not all pressed. A weight w in v^2 is w / (2 v) in
+    v.
     """
     places, node = _surroundings(problem)
     dim, offset = len(places), places - problem.chart.places[:, [top]]

@@ -25,6 +25,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from contactopt.bodies.fields import Region
+from contactopt.bodies.views import stress_map
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
@@ -84,9 +85,8 @@ class StressReading(Reading):
 
 
 def place_of(name: Any, scene: Scene) -> Place | None:
-    """Find the quantity at a place that has a name; None for the names of other quantities.
-
-    InputError for a body, pair, component or point that the scene does not have.
+    """The quantity at a place that has a name; None for other quantities. InputError for a body,
+    pair, component or point that the scene does not have.
     """
     if not isinstance(name, str):
         return None
@@ -215,7 +215,7 @@ def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tup
     of the displacement, or the derivative of that map by Poisson's ratio.
     """
     number = [part.name for part in reduction.scene.parts].index(place.owner)
-    recovered = reduction.bodies[number].stress_map(place.region, by_poisson)
+    recovered = stress_map(reduction.bodies[number], place.region, by_poisson)
     if recovered is None:
         raise InputError(
             f"quantity {place.name!r}: the stress inside body '{place.owner}' cannot be read here."
@@ -224,11 +224,8 @@ def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tup
 
 
 def place_seeds(place: Place, state: State) -> Seeds:
-    """The slopes of a quantity at a place. A stress inside a body is a function of its displacement
-    U, which follows the contact forces by its compliance.
-
-    A largest stress has the derivative of the stress at the place where it is largest. The
-    multipliers do not enter, since the free motions that they stand for strain nothing.
+    """The slopes of a quantity at a place. A stress is a function of the displacement U of its
+    body, which free motions do not strain; a largest one is differentiated where it is.
     """
     if place.kind == "pressure":
         return Functional(pressure_weights(place, state.reduction))(state)
@@ -269,10 +266,8 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
 
 
 def read_place(place: Place, reduction: Reduction, solution: Solution) -> Reading:
-    """Read a quantity at a place, with its uncertainty [stress].
-
-    The uncertainty of a pressure is what the nodal values scatter about the linear function through
-    them. Where no contact near the place touches, the reading says that there is no pressure.
+    """Read a quantity at a place, with its uncertainty [stress]: of a pressure what nodes scatter
+    about a linear function. A reading without contact nearby says so.
     """
     if place.kind != "pressure":
         return read_stress(place, reduction, reduction.displaced(solution))

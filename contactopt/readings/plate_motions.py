@@ -31,9 +31,8 @@ class Motion(NamedTuple):
 
 
 def approach(reduction: Reduction, solution: Solution) -> float | None:
-    """How far the plates bring the bodies together along the mean normal [length].
-
-    None without a plate, and where the surface surrounds a body, so that its normals have no mean.
+    """How far the plates bring the bodies together along the mean normal [length]; None without a
+    plate, or where normals have no mean.
     """
     if not any(_has_plate(part) for part in reduction.scene.parts):
         return None
@@ -42,12 +41,9 @@ def approach(reduction: Reduction, solution: Solution) -> float | None:
 
 
 def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Motion | None:
-    """The motion along the mean normal (component 0) or the mean t1 (1), from the displacements U
-    (n,) of the bodies. Around a body these have no mean: there is no motion along the normal, None,
-    and that along t1 is zero in the mean.
-
-    Bodies with plates count, of those above and those below the contacts the means. Without any
-    plate all bodies count.
+    """The motion along the mean normal (component 0) or the mean t1 (1), from displacements U (n,):
+    of bodies with plates, else of all, upper less lower mean. Around a body there is none along the
+    normal (None), and that along t1 is zero in the mean.
     """
     weights = _weights(reduction, component)
     if weights is None:

@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import energy, energy_change
 from contactopt.cards import force_unit
 from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
@@ -72,10 +73,8 @@ class Quantity:
 
 
 def find_quantity(name: Any, scene: Scene) -> Quantity:
-    """Find a quantity by its name, one from this module's head, before anything is solved.
-
-    InputError for an unknown quantity, and for a body, boundary, pair or place that the scene does
-    not have.
+    """Find a quantity by its name in this module's head, before anything is solved. InputError for
+    what the scene does not have.
     """
     if not isinstance(name, str):
         raise InputError(f"a quantity is given by its name; got {name!r}.")
@@ -132,8 +131,9 @@ def value_of(name: str, reduction: Reduction, solution: Solution) -> float:
 
 def elastic_energy(reduction: Reduction, solution: Solution) -> float:
     """Elastic energy of all bodies together, the sum of U' A U / 2 [force length]."""
-    displaced = reduction.displaced(solution)
-    return sum(body.energy(U) for body, U in zip(reduction.bodies, displaced))
+    state = State(reduction, solution)
+    parts = zip(reduction.bodies, state.displaced, state.forces)
+    return sum(energy(body, U, F) for body, U, F in parts)
 
 
 def _of_pair(
@@ -241,11 +241,11 @@ def _motion(state: State, component: int) -> Seeds:
         )
     by_r, by_motions, by_U = np.zeros(state.problem.q.shape), [], []
     for body, B, weights in zip(reduction.bodies, reduction.maps, sign * found.weights):
-        own: Any = np.zeros(len(body.resultants))
+        own = np.zeros(len(body.motions.resultants))
         total: Any = None
         for c in np.flatnonzero(weights):
             w, moved = (weights[c] * each for each in body.carried(int(c)))
-            rates = w @ body.motions
+            rates = w @ body.motions.fields
             own = own + rates
             if np.any(moved) or not np.any(rates):  # more than the free motions move it
                 by_r += (B @ moved).reshape(by_r.shape)
@@ -281,9 +281,8 @@ def _path_column(name: str, rest: str, scene: Scene) -> Quantity:
 
 def _energy(state: State) -> Seeds:
     reduction, by_r, by_U = state.reduction, np.zeros(state.problem.q.shape), []
-    for number, (body, B) in enumerate(zip(reduction.bodies, reduction.maps)):
-        own, by_force = body.energy_gradient(state.displaced[number], state.forces[number])
-        by_r += (B @ by_force).reshape(by_r.shape)
+    for number, body in enumerate(reduction.bodies):
+        own = body.internal_forces(state.displaced[number], state.forces[number])
         if np.any(own):
             by_r += state.following(number, own)
         by_U.append(own)
@@ -293,7 +292,7 @@ def _energy(state: State) -> Seeds:
             return 0.0
         parts = zip(reduction.scene.parts, reduction.bodies, state.displaced, state.forces)
         return sum(
-            body.energy_change(which.kind, U, F)
+            energy_change(body, which.kind, U, F)
             for part, body, U, F in parts
             if which.concerns(part)
         )

@@ -21,10 +21,9 @@ COVERED = 0.99  # a contact with less than this share of its faces lies where th
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Full sentences on couplings that do not pass a constant pressure on. For certified solutions
-    also on zones of contact that end by themselves and are smaller than the mesh can show, a disc
-    or strip of FEWEST elements across its half-width, and on contacts at the other surface's rim,
-    where only a part of their faces bears the force.
+    """Sentences on couplings that do not pass a constant pressure on; for certified solutions also
+    on zones that end by themselves and are smaller than FEWEST elements, and on contacts at the
+    other surface's rim.
     """
     coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:

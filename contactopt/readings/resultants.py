@@ -4,12 +4,12 @@ space.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import acting, held_by, plates
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution, alone
 from contactopt.problem.cones import lengths
@@ -17,7 +17,6 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_zone, is_level, stick_width
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.kinds import KINDS
-from contactopt.scenes.loads import Load
 
 ROUNDING = 1e-9  # components below this share of the force are written as zero
 ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
@@ -37,9 +36,8 @@ class Resultant:
 
 
 def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> Resultant:
-    """The resultant of nodal forces (dim, m) at points (dim, m), those of all mirror images
-    together or of whole rings, with components r and z. Mirror images across `planes` and the parts
-    of a ring balance each other but for what acts along the planes and along the axis.
+    """The resultant of nodal forces (dim, m) at points (dim, m), with all mirror images, or of
+    whole rings (r and z): images balance each other but along planes and axis.
     """
     if reduction.scene.analysis.revolved:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
@@ -53,9 +51,8 @@ def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> 
 
 
 def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
-    """The planes beyond which mirror images make the bodies whole, each as {"axis": name of a
-    coordinate, "place": [length]}. The axis of revolution counts as one in its section. The list is
-    empty where the bodies are whole, and where a plane does not lie across an axis.
+    """The planes beyond which mirror images make the bodies whole, an axis of revolution among
+    them, as {"axis": coordinate, "place": [length]}; none where one does not lie across an axis.
     """
     scene = reduction.scene
     if scene.analysis.revolved:
@@ -76,18 +73,19 @@ def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
 
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every pair of surfaces, by its name, the resultant of the contact forces on its upper
-    body: of the forces on the nodes, which balance those of the supports to rounding. Those on the
-    nodes of the lower body count where the upper one has none.
+    """For every pair, by name, the resultant of the contact forces on the nodes of its upper body;
+    of the lower one where the upper has none.
     """
     named = {body.name: body for body in reduction.bodies}
     space, found = space_forces(reduction, solution), {}
     for pair, own, made in zip(reduction.scene.pairs, reduction.problem.pairs, reduction.couplings):
-        forces, acting = solution.reactions[own.contacts].ravel(), None
+        forces, there = solution.reactions[own.contacts].ravel(), None
         for name, trace in zip(pair.bodies, (made.upper, made.lower)):
-            acting = named[name].acting(trace.T @ forces) if acting is None else acting
+            view = named[name].view
+            if there is None and view is not None:
+                there = acting(view, trace.T @ forces)
         points = reduction.problem.coordinates[:, own.contacts]
-        found[own.name] = _resultant(reduction, *(acting or (points, space[:, own.contacts])))
+        found[own.name] = _resultant(reduction, *(there or (points, space[:, own.contacts])))
     return found
 
 
@@ -97,15 +95,14 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
     """
     found, displaced = {}, reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        for name, held in body.held_by(U, B.T @ solution.reactions.ravel()).items():
+        for name, held in held_by(body, U, B.T @ solution.reactions.ravel()).items():
             found[f"body '{body.name}', {name}"] = _resultant(reduction, *held)
     return found
 
 
 def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """The reduction and solution of every pair of surfaces by itself, for readers of its surface;
-    those of the scene where there is one pair only. A view has no displacements of the bodies,
-    since these need the forces of all pairs.
+    """The reduction and solution of every pair by itself, for readers of its surface. A view has no
+    displacements of the bodies, since these need the forces of all pairs.
     """
     if len(reduction.problem.pairs) == 1:
         return [(reduction, solution)]
@@ -135,7 +132,7 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     """One number for each load, motion, resultant and moment of a state, by names such as
 
     force:punch:top:y, displacement:block:bottom:x  what a scene prescribes [force], [length],
-                                                     also traction and weight
+                                                     also traction, pressure, bolt and weight
     motion:punch, plate 'top', y                     of plates and bodies that move freely, in
                                                      the words of the problem's `motions`
     force:PAIR:x, moment:PAIR:z                      on the upper body of a pair
@@ -144,30 +141,24 @@ def columns(reduction: Reduction, solution: Solution) -> dict[str, float]:
     scene, axes = reduction.scene, reduction.scene.components
     found: dict[str, float] = {}
     for part in scene.parts:
-        for item in (part, *getattr(part, "supports", ()), *getattr(part, "loads", ())):
-            for kind, given in _prescribed(item, axes).items():
-                place = [kind, part.name, getattr(item, "boundary", "")]
-                for axis, value in given.items():
-                    found[":".join([*filter(None, place), axis])] = float(value)
+        for kind in ("force", "displacement"):  # of a body without a mesh
+            for axis, value in (getattr(part, kind, None) or {}).items():
+                found[f"{kind}:{part.name}:{axis}"] = float(value)
+        for item in (*getattr(part, "supports", ()), *getattr(part, "loads", ())):
+            place = item.form.partition(":")[0], *item.address(part.name)
+            for axis, value in item.values(axes).items():
+                found[":".join(filter(None, (*place, axis)))] = float(value)
     names = reduction.problem.motions or range(len(solution.multipliers))
     found |= {f"motion:{name}": float(x) for name, x in zip(names, solution.multipliers)}
     for body, U in zip(reduction.bodies, reduction.displaced(solution)):
-        plates = body.plates(U).items()
-        found |= {f"motion:body '{body.name}': {name}": value for name, value in plates}
+        moved = plates(body, U).items()
+        found |= {f"motion:body '{body.name}': {name}": value for name, value in moved}
     every = pair_resultants(reduction, solution) | holder_resultants(reduction, solution)
     turns = axes if reduction.problem.dim == 3 else ("z",)
     for name, own in every.items():
         found |= {f"force:{name}:{c}": float(f) for c, f in zip(axes, own.force)}
         found |= {f"moment:{name}:{c}": float(m) for c, m in zip(turns, own.moment)}
     return found
-
-
-def _prescribed(item: Any, axes: tuple[str, ...]) -> dict[str, Mapping[str, float]]:
-    """What a support, a load or a rigid body prescribes: kind -> component -> value."""
-    if isinstance(item, Load):
-        return {item.form.partition(":")[0]: item.values(axes)}
-    kinds = ("force", "displacement")
-    return {kind: given for kind in kinds if (given := getattr(item, kind, None))}
 
 
 def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:

@@ -51,12 +51,8 @@ def of_width(state: State, pair: int) -> Seeds:
 
 
 def of_stick(state: State, pair: int) -> Seeds:
-    """Half-width of the stick zone over that of contact, differentiated where contacts stay open,
-    stick or slip as they do.
-
-    It depends on the forces at closed contacts, on the slip of the step, and on the friction bound.
-    A contact that slips stays at its bound: its tangential force changes with the normal one, and
-    may turn.
+    """Half-width of the stick zone over that of contact, by forces at closed contacts, slip and
+    bounds, while contacts keep their states. A slipping contact stays at its bound.
     """
     reduction, solution = views(state.reduction, state.solution)[pair]
     scene, problem, r = reduction.scene, reduction.problem, solution.reactions

@@ -26,10 +26,10 @@ class Seeds:
     """
 
     value: float
-    reactions: Any = None
-    multipliers: Any = None
-    displacements: Any = None
-    slip: Any = None
+    reactions: np.ndarray | None = None
+    multipliers: np.ndarray | None = None
+    displacements: np.ndarray | None = None
+    slip: np.ndarray | None = None
     bodies: tuple[Any, ...] = ()
     explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
 
@@ -58,7 +58,7 @@ class State:
     def following(self, number: int, load: np.ndarray) -> np.ndarray:
         """(k, dim) what a load (n,) on a body moves the contacts by, without its motions."""
         body, B = self.reduction.bodies[number], self.reduction.maps[number]
-        moved = body.displacement(load, np.zeros(len(body.resultants))) - body.at_rest
+        moved = body.displacement(load, np.zeros(len(body.motions.resultants))) - body.at_rest
         return np.asarray(B @ moved).reshape(self.problem.q.shape)
 
     def law_change(self, which: Parameter) -> np.ndarray:
@@ -81,7 +81,7 @@ class Functional:
     weights  (k, dim), one per component of the reactions
     """
 
-    weights: Any
+    weights: np.ndarray
 
     def __call__(self, state: State) -> Seeds:
         weights, shape = np.asarray(self.weights, dtype=float), state.problem.q.shape

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import limits
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
@@ -37,10 +39,8 @@ UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facet
 
 
 def overlap_share(reduction: Reduction, solution: Solution) -> float:
-    """By which share the areas of two surfaces differ that overlap as they are drawn, the mean over
-    the contacts with their forces as weights [-].
-
-    Small displacements do not tell on which of the two a pressure acts.
+    """By which share the areas of surfaces that overlap as drawn differ, the mean weighted by
+    forces [-]: small displacements do not tell on which of the two a pressure acts.
     """
     shares = np.zeros(len(solution.reactions))
     ring = reduction.scene.kind == "axisymmetric"
@@ -85,9 +85,9 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     bodies: dict[str, dict[str, float]] = {}
     remarks: list[str] = []
     moved = reduction.seen(displaced)
-    scale = np.zeros(len(moved))
+    scale, none = np.zeros(len(moved)), TOL * float(np.abs(reactions).sum())
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        known = bodies[body.name] = body.limits(U, B.T @ reactions)._asdict()
+        known = bodies[body.name] = limits(body, U, B.T @ reactions, none)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
         if known["imbalance"] > BOUNDS["imbalance"]:

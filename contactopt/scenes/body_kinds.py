@@ -6,11 +6,12 @@ checked by the scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
@@ -28,7 +29,8 @@ class Support:
     """Prescribed displacement on a named boundary, eq (3) of the paper.
 
     `displacement` maps components to values [length]; None clamps every component. A symmetry plane
-    is a Support that holds the normal component only.
+    is a Support that holds the normal component only. 'a/b' is the edge where the boundaries a and
+    b meet, in the plane a point, and 'a/b/c' the point where three meet.
     """
 
     what = "support"
@@ -36,11 +38,19 @@ class Support:
     boundary: str
     displacement: Mapping[str, float] | None = None
 
+    def faces(self, known: Container[str]) -> tuple[str, ...]:
+        """The boundaries whose common nodes are held: one known by this name, or several."""
+        return (self.boundary,) if self.boundary in known else tuple(self.boundary.split("/"))
+
     def values(self, components: tuple[str, ...]) -> dict[str, float]:
         """The displacement by component, as Load.values."""
         return (
             dict.fromkeys(components, 0.0) if self.displacement is None else {**self.displacement}
         )
+
+    def address(self, body: str) -> tuple[str, ...]:
+        """As Load.address."""
+        return body, self.boundary
 
     def with_values(self, values: Mapping[str, float]) -> Support:
         """As Load.with_values."""
@@ -62,7 +72,7 @@ class Part:
     """
 
     name: str
-    mesh: Any
+    mesh: Mesh
     material: Material
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()

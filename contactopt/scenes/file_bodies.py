@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import make_mesh
@@ -16,6 +17,7 @@ from contactopt.scenes.facing_boundaries import Facing
 from contactopt.scenes.file_surfaces import half_space_shape
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.loads import load_classes
+from contactopt.scenes.loads.bolt import Bolt, with_bolts
 from contactopt.scenes.loads.load import Given
 from contactopt.scenes.material_library import Named, material_of
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Support
@@ -130,6 +132,26 @@ def read_body(bodies: Table, name: str, reading: Reading) -> Part | Rigid | Half
         return Part(name, mesh, made, supports, tuple(loads), contact, curve)
 
 
+def bolted(top: Table, parts: list[Any], reading: Reading) -> list[Any]:
+    """The bodies with the bolts of the file."""
+    bolts: list[Bolt] = []
+    for table in top.tables("bolts"):
+        what = 'two faces, as in ["upper.top", "lower.bottom"]'
+        between = table.take("between", list, needed=True, what=what)
+        force, way = reading.numbers(table, keys=("force",)), table.table("direction")
+        if not force:
+            raise table.fail("a bolt needs its force, as in force = 20e3.")
+        name, tilting = table.take("name", str, ""), table.take("tilting", bool, True)
+        axis = None if way is None else reading.vector(reading.numbers(way, whole=True))
+        table.close()
+        with table.about():
+            bolts.append(Bolt(tuple(between), force["force"], name, tilting, axis))
+            meshes = {part.name: part.mesh for part in parts if part.meshed}
+            for body, end in bolts[-1].ends(parts, f"bolt{len(bolts)}"):
+                _named(table, "between", end.boundary, meshes[body], f"body '{body}'")
+    return list(with_bolts(parts, bolts)) if bolts else parts
+
+
 def _half_space(name: str, body: Table, reading: Reading) -> HalfSpace:
     made = material_of(body, reading.materials, reading.stress)
     table = body.table("half_space")
@@ -169,20 +191,28 @@ def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
     )
 
 
-def _support(table: Table, mesh: Any, reading: Reading) -> Support:
-    boundary, values = _boundary(table, "boundary", mesh), reading.numbers(table)
+def _support(table: Table, mesh: Mesh, reading: Reading) -> Support:
+    what = 'a boundary, or those that meet in an edge or a point, as in "a/b"'
+    name = table.take("boundary", str, needed=True, what=what)
+    made = Support(name, reading.numbers(table) or None)
     table.close()
-    return Support(boundary, values or None)
+    for face in made.faces(mesh.boundaries or {}):
+        _named(table, "boundary", face, mesh, "the body")
+    return made
 
 
-def _boundary(table: Table, key: str, mesh: Any) -> str:
-    name = table.take(key, str, needed=True)
+def _boundary(table: Table, key: str, mesh: Mesh) -> str:
+    return _named(table, key, table.take(key, str, needed=True), mesh, "the body")
+
+
+def _named(table: Table, key: str, name: str, mesh: Mesh, body: str) -> str:
+    """The name of a boundary of a mesh."""
     known = mesh.boundaries or {}
     if name not in known:
         raise table.fail(
-            f"the body has no boundary {name!r}; it has {', '.join(sorted(known)) or 'none'}.", key
+            f"{body} has no boundary {name!r}; it has {', '.join(sorted(known)) or 'none'}.", key
         )
-    return str(name)
+    return name
 
 
 def _curve(table: Table | None, reading: Reading) -> Callable[[np.ndarray], np.ndarray] | None:

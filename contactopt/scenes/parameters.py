@@ -11,6 +11,7 @@
                                              without the boundary
     traction:BODY:BOUNDARY:COMPONENT         surface force per area [stress]
     pressure:BODY:BOUNDARY                   pressure along the normals [stress]
+    bolt:NAME                                force with which it pulls its faces together [force]
     weight:BODY:COMPONENT                    force per volume [force / length^3]
     gap                                      the initial gap, one number per contact (k,) [length];
                                              gradients only
@@ -33,6 +34,7 @@ from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
 from contactopt.scenes.body_kinds import Support
 from contactopt.scenes.loads import Load, load_classes
+from contactopt.scenes.loads.bolt import BoltEnd
 from contactopt.scenes.scene import Scene
 
 MATERIAL = ("E", "nu")
@@ -40,7 +42,7 @@ FIELDS = ("gap", "friction")
 # of what holds and loads bodies
 FORM = {
     form.partition(":")[0]: form
-    for form in (Support.form, *(load.form for load in load_classes().values()))
+    for form in (Support.form, BoltEnd.form, *(load.form for load in load_classes().values()))
 }
 
 
@@ -128,7 +130,8 @@ class Parameter:
         changes = {}
         for name in ("supports", "loads"):
             items = getattr(part, name)
-            rows = [self._in_item(item, self._held(item, scene), value) for item in items]
+            held = (self._held(item, part.name, scene) for item in items)
+            rows = [self._in_item(item, own, value) for item, own in zip(items, held)]
             found += [known for own, _ in rows for known in own]
             changes[name] = tuple(item for _, item in rows)
         return found, replace(part, **changes) if found and value is not None else part
@@ -154,9 +157,10 @@ class Parameter:
             return {}
         return {self.component: 0.0} | dict(held)
 
-    def _held(self, item: Support | Load, scene: Scene) -> Mapping[str, float]:
-        """The values of a support or load by component, if it is one of them."""
-        there = self.boundary in (item.boundary, "" if self.kind == "force" else item.boundary)
+    def _held(self, item: Support | Load, body: str, scene: Scene) -> Mapping[str, float]:
+        """The values of a support or load of a body by component, if it is one of them."""
+        there = item.address(body) == tuple(filter(None, (self.owner, self.boundary)))
+        there |= self.kind == "force" and not self.boundary
         own = item.form.partition(":")[0] == self.kind
         return item.values(scene.components) if own and there else {}
 
@@ -172,7 +176,8 @@ class Parameter:
             return "its contacts have no friction"
         if self.kind in MATERIAL:
             return f"body '{self.owner}' is rigid" if self.owner else "it has no elastic body"
-        return f"body '{self.owner}' has no such {self.kind}"
+        whose = f"body '{self.owner}'" if self.owner else "it"
+        return f"{whose} has no such {self.kind}"
 
 
 def parameter(name: Any, scene: Scene) -> Parameter:
@@ -188,8 +193,8 @@ def parameter(name: Any, scene: Scene) -> Parameter:
     if kind in FIELDS and not rest:
         return Parameter(name, kind)
     plain = kind in FORM and "COMPONENT" not in FORM[kind]  # a number without a direction
-    if len(rest) == 2 if plain else kind in (*MATERIAL, "mu") and len(rest) <= 1:
-        made = Parameter(name, kind, *rest)
+    if len(rest) == FORM[kind].count(":") if plain else kind in (*MATERIAL, "mu") and len(rest) < 2:
+        made = Parameter(name, kind, *(["", *rest] if plain else rest)[-2:])
     elif "COMPONENT" in FORM.get(kind, "") and len(rest) in (2, 3):
         made = Parameter(name, kind, rest[0], rest[1] if len(rest) == 3 else "", rest[-1])
         if made.component not in scene.components:

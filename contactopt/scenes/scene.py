@@ -7,7 +7,7 @@ system is the user's; the named scenes (contactopt.scenes) use newton, millimetr
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,15 +15,19 @@ import numpy as np
 from contactopt.checks import check_number, check_size, short
 from contactopt.errors import InputError
 from contactopt.scenes.body_kinds import Body, HalfSpace, Part, Rigid, Support
+from contactopt.scenes.body_shapes import LENGTHS
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.kinds import KINDS, Kind
 from contactopt.scenes.loads.body_force import BodyForce
+from contactopt.scenes.loads.bolt import Bolt, BoltEnd, with_bolts
 from contactopt.scenes.loads.plate import Plate
 from contactopt.scenes.loads.pressure import Pressure
 from contactopt.scenes.loads.traction import Traction
+from contactopt.scenes.material_library import STRESSES
 
 __all__ = [
     "BodyForce",
+    "Bolt",
     "HalfSpace",
     "Part",
     "Plate",
@@ -57,6 +61,8 @@ class Scene:
                `copies` is then 2 for each unless it is given. None: where copies > 1, the planes
                are those on which supports hold the normal alone
     state      name of the step of a load path to which this state belongs
+    bolts      that pull faces of the bodies together; their ends become loads of the bodies, which
+               `bolt_ends` lists. None: those that the bodies have
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly
                incompressible bodies, where linear elements lock. By default that of the meshes: 2
                if one that is given has elements of second order, else 1.
@@ -64,7 +70,9 @@ class Scene:
                function.
     zone       first guess of the contact half-width [length]; None when the geometry fixes the
                contact zone.
-    units      names of the units of length and stress, for the axes of figures
+    units      names of the units of length and stress, for figures and for checks of sizes. Any
+               names, but those of contactopt.scenes.body_shapes.LENGTHS and
+               contactopt.scenes.material_library.STRESSES are written as there: MPa, not mpa
     reference  an exact solution to compare with (contactopt.analytic.Reference), or None.
     """
 
@@ -85,8 +93,9 @@ class Scene:
     contacts: tuple[Contact, ...] = ()
     mirror: str | None = None
     state: str = ""
+    bolts: InitVar[tuple[Bolt, ...] | None] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, bolts: tuple[Bolt, ...] | None) -> None:
         if not isinstance(self.name, str):
             raise InputError(f"the scene's name must be a text; got {short(self.name)}.")
         if not isinstance(self.kind, str) or self.kind not in KINDS:
@@ -97,6 +106,8 @@ class Scene:
                 raise self._wrong(
                     f"a body must be a Part, a Rigid or a HalfSpace; got {short(part)}."
                 )
+        if bolts is not None:
+            self._put(bolts)
         check_size("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
@@ -111,10 +122,16 @@ class Scene:
             raise self._wrong(
                 f"the degree of the displacement must be 1 or 2; got {self.degree!r}."
             )
+        check_units(self.units)
         self._check_mirror()
         self._check_pairs()
         for part in self.parts:
             part.check_in(self.kind)
+        for name, ends in self.bolt_ends.items():
+            if len(ends) != 2:
+                raise self._wrong(
+                    f"bolt '{name}' has {len(ends)} ends; give each bolt its own name."
+                )
 
     def _repr_html_(self) -> str:
         # the one look upwards of this room, taken only where a notebook shows a scene
@@ -159,6 +176,25 @@ class Scene:
         if self.upper is None or self.lower is None:
             return replace(self, bodies=tuple(change(part) for part in self.bodies))
         return replace(self, upper=change(self.upper), lower=change(self.lower))
+
+    @property
+    def bolt_ends(self) -> dict[str, list[tuple[Part, BoltEnd]]]:
+        """The loads that are ends of bolts, each with its body, by the name of the bolt."""
+        found: dict[str, list[tuple[Part, Any]]] = {}
+        for part in self.meshed.values():
+            for load in part.loads:
+                if load.shared:
+                    found.setdefault(load.address(part.name)[0], []).append((part, load))
+        return found
+
+    def _put(self, bolts: Sequence[Bolt]) -> None:
+        """Give the bodies the ends of these bolts, in place of those that they had."""
+        parts = with_bolts(self.parts, bolts)
+        names = ("upper", "lower") if self.upper is not None else ()
+        for name, part in zip(names, parts):
+            object.__setattr__(self, name, part)
+        if not names:
+            object.__setattr__(self, "bodies", parts)
 
     def surfaces_of(self, part: Any) -> tuple[str, ...]:
         """The boundaries of a part that contacts use, each once, in the order of the pairs."""
@@ -274,6 +310,22 @@ class Scene:
         for name in names:
             if not any(name in pair.bodies for pair in pairs):
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")
+
+
+def check_units(units: Any) -> None:
+    """Raise InputError unless these are the names of a unit of length and of one of stress. A name
+    that is known but for its capital letters would not be known.
+    """
+    if not isinstance(units, (tuple, list)) or len(units) != 2:
+        raise InputError(
+            f"the units of a scene are two names, as in ('mm', 'MPa'); got {short(units)}."
+        )
+    for what, name, known in zip(("length", "stress"), units, (LENGTHS, STRESSES)):
+        if not isinstance(name, str) or not name.strip():
+            raise InputError(f"the unit of {what} must have a name; got {short(name)}.")
+        same = [own for own in known if own.lower() == name.strip().lower()]
+        if same and name not in same:
+            raise InputError(f"there is no unit of {what} {name!r}; did you mean {same[0]!r}?")
 
 
 def _curved(part: Any) -> bool:

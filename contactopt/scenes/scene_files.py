@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import InputError
-from contactopt.files.toml_table import Table, change, read_table
+from contactopt.files.toml_table import Table, at_line, change, read_table
 from contactopt.problem.laws import LAWS
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
-from contactopt.scenes.file_bodies import Reading, function_of, read_body
+from contactopt.scenes.file_bodies import Reading, bolted, function_of, read_body
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, library, read_materials
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import Scene, check_units
 
 MOST_STATES = 10_000  # of a step of a load path
 AUTO = "auto"  # in place of the contacts: they are found
@@ -38,20 +38,18 @@ class SceneFile:
     states  the scene, or the states of its load path, which differ in their loads alone
     solve   arguments of contactopt.run: method, tol, accuracy, ...
     name    of the file
-    lines   of bodies and contacts by their names
+    lines   of bodies and contacts by their names, and of what is chosen in [solve] by its value
     """
 
     states: tuple[Scene, ...]
     solve: dict[str, Any]
     name: str
-    lines: dict[str, int]
+    lines: dict[str, int | str]
 
     def located(self, error: InputError) -> InputError:
-        """The mistake with the name of the file, and the line of the body or contact in it."""
-        for name, line in self.lines.items():
-            if f"'{name}'" in str(error):
-                return InputError(f"{self.name}, line {line}: {error}")
-        return InputError(f"{self.name}: {error}")
+        """The mistake with the name of the file, and the line of what it names in quotes."""
+        line = next((own for name, own in self.lines.items() if f"'{name}'" in str(error)), "")
+        return InputError(f"{self.name}{at_line(line)}: {error}")
 
 
 def read_scene_file(path: str | Path, changes: Mapping[str, Any] | None = None) -> SceneFile:
@@ -78,7 +76,7 @@ def read_scene_file(path: str | Path, changes: Mapping[str, Any] | None = None) 
 
 def read_scenes(
     table: Callable[[], Table], path: Path
-) -> tuple[tuple[Scene, ...], dict[str, Any], dict[str, Any]]:
+) -> tuple[tuple[Scene, ...], dict[str, Any], dict[str, int | str]]:
     """As read_scene_file(), from a function that makes the table anew: states, options, lines."""
     top = table()
     first, solve, reading = _scene(path, top, None)
@@ -98,10 +96,11 @@ def read_scenes(
         raise top.fail(
             "an accuracy can be asked for only without a load path.", "solve", "accuracy"
         )
-    where = top.lines.get(("contacts",), 0)  # of those that are found
+    where = top.lines.get(("contacts",), "")  # of those that are found
     lines = {c.name: top.lines.get(("contacts", i), where) for i, c in enumerate(first.contacts)}
     known = [own.name for own in first.bodies if ("bodies", own.name) in top.lines]
     lines |= {name: top.lines["bodies", name] for name in known}
+    lines |= {own: top.lines.get(("solve", key), where) for key, own in solve.items()}
     return tuple(states), solve, lines
 
 
@@ -114,6 +113,8 @@ def _scene(
     if units:
         length, stress = (units.take(key, str, needed=True) for key in ("length", "stress"))
         units.close()
+        with units.about():
+            check_units((length, stress))
     materials, steps = _materials(top, path.parent), _steps(top)
     reading = reading or Reading(path.parent, kind, length, stress, steps=steps)
     reading.materials = materials
@@ -121,6 +122,7 @@ def _scene(
     if bodies is None or not bodies.data:
         raise top.fail("there are no bodies; add a table [bodies.NAME] for each.")
     parts = [read_body(bodies, name, reading) for name in bodies.data]
+    parts = bolted(top, parts, reading)
     if isinstance(top.data.get("contacts"), str):
         pairs = _found(top, parts, reading)
     else:
@@ -172,6 +174,8 @@ def _steps(top: Table) -> tuple[tuple[str, int], ...]:
             found.append((step.take("name", str, needed=True), step.take("states", int, 1)))
             step.close()
     for i, (name, states) in enumerate(found):
+        if not name.strip() or name in [other for other, _ in found[:i]]:
+            raise top.fail(f"each step needs a name of its own; got {name!r}.", "steps", i)
         if not 1 <= states <= MOST_STATES:
             valid = f"from 1 to {MOST_STATES}"
             raise top.fail(
@@ -216,7 +220,7 @@ def _free(part: Any) -> Any:
     loads, and are not the whole surface where there are others.
     """
     named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
-    used = [named[own.boundary] for own in (*part.supports, *part.loads) if own.boundary]
+    used = [named[o.boundary] for o in (*part.supports, *part.loads) if o.boundary in named]
     taken = np.concatenate([np.zeros(0, dtype=int), *used])
     whole = len(part.mesh.boundary_facets())
     free = {name: own for name, own in named.items() if not np.isin(own, taken).any()}

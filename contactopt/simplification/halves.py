@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
@@ -54,7 +55,7 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
 def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
     """The function that takes the elements above a plane, with a boundary of that name in it."""
 
-    def change(mesh: Any) -> Any:
+    def change(mesh: Mesh) -> Any:
         near = NEAR * float(np.ptp(mesh.p, axis=1).max())
         height = plane.height(mesh.p)[mesh.t]
         if np.any((height.min(axis=0) < -near) & (height.max(axis=0) > near)):
@@ -71,7 +72,7 @@ def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
     return change
 
 
-def _restricted(mesh: Any, elements: np.ndarray) -> Any:
+def _restricted(mesh: Mesh, elements: np.ndarray) -> Any:
     """The mesh of some elements; those of second order keep their curved sides."""
     own = straight(mesh).restrict(elements)
     if not is_curved(mesh):
@@ -133,15 +134,16 @@ def _doubled(values: Any) -> Any:
     return {name: 2 * value for name, value in values.items()} if values else values
 
 
-def _of_both(load: Any) -> Any:
-    """A load that stands for two: a plate has the force of all images."""
-    return load.with_values(_doubled(load.force)) if load.level else load
+def _of_both(load: Any, components: tuple[str, ...]) -> Any:
+    """A load that stands for two: a plate and a bolt have the force of all images."""
+    return load.with_values(_doubled(load.values(components))) if load.total else load
 
 
 def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component: str) -> Part:
     name, own = part.name, whole.meshes[part.name].boundaries or {}
+    components = whole.scene.components
     if images.bodies[name] != name:
-        return replace(part, loads=tuple(map(_of_both, part.loads)))
+        return replace(part, loads=tuple(_of_both(load, components) for load in part.loads))
     cut = f"symmetry {component}"
     while cut in own:
         cut += "'"
@@ -153,9 +155,11 @@ def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component
     supports.append(Support(cut, {component: 0.0}))
     loads: list[Any] = []
     for number, load in enumerate(part.loads):
-        if not load.level or (name, number) not in images.own:
+        if (name, number) not in images.own:
             if not load.boundary or there(load.boundary):
-                loads.append(_of_both(load))
+                loads.append(_of_both(load, components))
+        elif not load.level:
+            loads.append(load)
         else:
             loads.append(load.with_values(_without(load.force, component)))
             if component in load.force and not load.glued:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
+from skfem import Mesh
 
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part
@@ -114,7 +115,7 @@ def _images_of_meshes(whole: Whole, plane: Plane) -> dict[str, tuple[str, np.nda
     return found if all(found[image][0] == name for name, (image, _) in found.items()) else None
 
 
-def _nodes(mesh: Any, image: Any, plane: Plane, near: float) -> np.ndarray | None:
+def _nodes(mesh: Mesh, image: Any, plane: Plane, near: float) -> np.ndarray | None:
     """The node of a mesh on which the image of each node lies; None unless all have images."""
     here, there = plane.image(mesh.doflocs), image.doflocs
     if here.shape != there.shape or mesh.t.shape != image.t.shape:
@@ -156,8 +157,11 @@ def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
         return
     for item in (*part.supports, *part.loads):
         kind = item.what + ("" if getattr(item, "glued", True) else " that slides")
+        kind += "" if getattr(item, "tilting", True) else " that stays parallel"
         values = item.values(components)
         space = held_space(components, values)
+        if (way := getattr(item, "direction", None)) is not None:
+            space = np.outer(way, way) / np.dot(way, way), space[1]
         yield _Condition(kind, item.boundary, *space, item, values.get("", 0.0))
 
 
@@ -212,7 +216,7 @@ class _Comparison:
                     and np.isclose(one.number, two.number, EQUAL, 0.0)
                 )
                 if same and (not one.where or self.fits(part.name, one.where, two.where)):
-                    if one.item is two.item and getattr(one.item, "level", False):
+                    if one.item is two.item and getattr(one.item, "total", False):
                         found.add((part.name, part.loads.index(one.item)))
                     break
             else:

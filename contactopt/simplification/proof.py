@@ -43,12 +43,9 @@ Fold = Callable[[Key, np.ndarray], tuple[Key, np.ndarray, np.ndarray]]
 def certificate_of_whole(
     whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]
 ) -> float:
-    """How far the whole is from solved by what the part's solution says of it.
-
-    This is the largest of the errors in the head of this module [-]; infinite where nodes or
-    contacts of the whole have no place in the part. `elements` and `zone` are the numbers for which
-    the meshes of both were made, and `folds` say how the whole lies on the part, one step after the
-    other.
+    """How far the whole is from solved by what the part's solution says of it: the largest error in
+    this module's head [-]; infinite where something of the whole has no place in the part. `folds`
+    say how the whole lies on it.
     """
     bodies: dict[str, Any] = {}
     for each in whole.parts:

@@ -19,11 +19,8 @@ def solve_states(
     options: Options | None = None,
     start: Solved | None = None,
 ) -> Solved:
-    """Solve a scene on meshes fitted to its contact zone, or follow the load path of several states
-    on one mesh; the last state then comes with the whole path.
-
-    `start` is the scene solved on another mesh; a path starts from the unloaded bodies. InputError
-    as from solve_zone() and follow().
+    """Solve a scene on meshes fitted to its contact zone from `start`, the scene solved on another
+    mesh, or follow a load path on one mesh. InputError as from solve_zone() and follow().
     """
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)

@@ -140,7 +140,12 @@ def state_of(
         earlier[:, 1:] = before.displacements[:, 1:]
     slip = problem.displacements(r, solution.multipliers)
     U = reduction.displaced(solution)
-    now = [(own, body.external_forces(own)) for body, own in zip(reduction.bodies, U)]
+    inner, now, elastic = zip(reduction.bodies, reduction.maps, U), [], 0.0
+    for body, B, own in inner:
+        force = B.T @ r.ravel()
+        resisted = body.internal_forces(own, force)
+        now.append((own, resisted - force))
+        elastic += float(own @ resisted) / 2
     # before the first state are the unloaded bodies
     u0, r0 = (gap, 0.0) if before is None else (before.displacements, before.solution.reactions)
     risen, shifted = (motion(reduction, U, component) for component in (0, 1))
@@ -155,7 +160,7 @@ def state_of(
         slip[:, 1:],
         np.nan if risen is None else risen.value,
         np.nan if shifted is None else shifted.value,
-        elastic=sum(body.energy(own) for body, own in zip(reduction.bodies, U)),
+        elastic=elastic,
         external=sum(float((F + F0) @ (own - U0)) for (own, F), (U0, F0) in steps) / 2,
         contact=-float(np.sum((r + r0) * (slip + earlier - u0))) / 2,
         bodies=U if here else (),

@@ -38,9 +38,8 @@ class Limits:
         check_number("max_memory", self.memory, low=0.0)
 
     def refusal(self, unknowns: float, usual: int, seconds: float, memory: float) -> str:
-        """Say in a sentence which bound the next mesh would pass, with so many unknowns, at a time
-        [s] and with a memory [bytes] of the whole search; nothing if it passes none. `usual` bounds
-        the unknowns where no bound was given.
+        """Which bound the next mesh would pass, in a sentence, at a time [s] and memory [bytes] of
+        the whole search; nothing if none. `usual` bounds the unknowns where nothing else does.
         """
         most = usual if self.unknowns is None else self.unknowns
         takes = ""

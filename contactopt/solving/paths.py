@@ -31,6 +31,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.bodies.views import fields
 from contactopt.cards import card, count, line
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
@@ -169,7 +170,7 @@ class PathResult:
         displacements.
         """
         pairs = zip(self.reduction.bodies, self.states[step].bodies)
-        return tuple(found for body, U in pairs if (found := body.fields(U)) is not None)
+        return tuple(found for body, U in pairs if (found := fields(body, U)) is not None)
 
     def write_history(self, file: Path) -> None:
         """Write the history as comma-separated values, one row per state, with the names of the

@@ -20,12 +20,9 @@ PATIENCE = 2.0  # seconds of a solve about which nothing is said
 def progress_lines(
     say: Callable[[str], None], problem: InterfaceProblem, tol: float
 ) -> Callable[[int, float], None]:
-    """Make a function (iteration, residual) for the `progress` of contactopt.solve that says a line
-    for each outer iteration of a solve that ends at the residual tol.
-
-    It says nothing before the solve has taken PATIENCE seconds. A line gives the residual, the
-    V-cycles, the time, the largest memory of the process so far, and the time that is left if the
-    residual goes on falling as it fell in the last iteration.
+    """A function for the `progress` of contactopt.solve that says a line for each outer iteration,
+    from PATIENCE seconds on: residual, V-cycles, time, memory, and the time left until the residual
+    is tol if it goes on falling as it fell last.
     """
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []

@@ -231,11 +231,8 @@ def make_restart(
     path: bool,
     note: Callable[[str], None],
 ) -> Restart:
-    """What keeps the states of a run in its folder `out` (None: nowhere), with those of the run in
-    it that it resumes, or of the run in the folder `start`; `path` says whether the run has a load
-    path.
-
-    The note is told where there is nothing to resume.
+    """What keeps the states of a run in the folder `out`, with those that it resumes there, or of
+    the run in `start`; `path`: whether it has a load path. `note` is told where there are none.
     """
     file = None if out is None else Path(out) / FILE
     if not resume:

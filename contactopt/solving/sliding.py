@@ -26,12 +26,11 @@ class Sliding(NamedTuple):
 
 
 def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None) -> Sliding | None:
-    """Find the free motion along which the load is more than friction bears, in a state that ended
-    without a solution, after a solved one, if any. None where friction may bear all of it.
+    """The free motion along which the load is more than friction bears, in a state that ended
+    without a solution, after a solved one, if any.
 
-    With unit displacements V of the contacts in a motion, the load s along it has to meet the
-    normal forces r_n, sum V_n r_n, and the friction, which makes at most sum b |V_t| with the
-    bounds b of r_n.
+    With unit displacements V of the contacts in a motion, the load along it has to meet the normal
+    forces, sum V_n r_n, and the friction, at most sum b |V_t|, b the bounds of r_n.
     """
     found = None
     for own in (before, ended):

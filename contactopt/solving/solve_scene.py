@@ -106,13 +106,11 @@ def solve_scene(
     start: Solved | None = None,
     once: bool = True,
 ) -> Solved:
-    """Reduce a scene on one mesh and solve it, by default with its own number of elements across
-    the contact half-width and its own zone [length]. The solution says itself whether it is
-    certified.
+    """Reduce a scene on one mesh and solve it, by default with its own number of elements and zone.
 
     `start` is the scene solved on another mesh. Without one, where Newton's steps take products
-    with Q, the scene is first solved on a coarser mesh, if its bodies can make one. `once` says
-    that no further states follow on the same bodies, whose factors would serve them too.
+    with Q, a coarser mesh comes first, if the bodies can make one. `once`: no further states follow
+    that the bodies' factors would serve.
     """
     options = options or Options()
     if not isinstance(scene, Scene):
@@ -185,12 +183,9 @@ def _one_way(
 
 
 def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Options) -> Solved:
-    """Solve the next state of a load path: the same bodies, coupling and Q under other loads.
-
-    The solution of the state before is the start, and slip is measured from its tangential
-    displacements (k, dim - 1) [length]. The form of Q and the bodies' solvers stay as they are. The
-    problem that comes back is that of this step alone. InputError if more than loads and friction
-    differ.
+    """Solve the next state of a load path: the same bodies, coupling and Q under other loads, from
+    the state before, slip measured from its tangential displacements (k, dim - 1) [length].
+    InputError if more than loads and friction differ.
     """
     step = before.reduction.loaded(scene).after(slipped)
     known = options.restart.start(step) if options.restart else None

@@ -25,11 +25,9 @@ def solve_zone(
     """Solve a scene; where it has a contact zone, remesh until its edge is a node of the mesh.
     InputError if fewer than two nodes are in contact.
 
-    Each round starts from the one before, the first from `start` (the scene solved on another mesh)
-    or from the guess `scene.zone`, and reads the new edge from the reactions. The loop ends when
-    two zones agree to AGREE of an element, when a solve fails, or after LOOPS rounds;
-    `solution.seconds` are summed over the rounds. A scene without a zone, or with several pairs of
-    surfaces, is solved once.
+    Each round starts from the one before, the first from `start` or `scene.zone`, and ends when two
+    zones agree to AGREE of an element, when a solve fails, or after LOOPS rounds. A scene without a
+    zone, or with several pairs, is solved once.
     """
     elements = scene.elements if elements is None else elements
     if scene.zone is None or len(scene.pairs) > 1:

@@ -62,7 +62,7 @@ maximum_signature_line_length = 100
 def write_lectures(app, error):
     """Write the slides, from the notebooks that MyST-NB has executed."""
     notebooks = Path(app.outdir).parent / "jupyter_execute" / "generated"
-    if error is None:
+    if error is None and app.config.nb_execution_mode != "off":  # else no notebook has figures
         lectures.write(notebooks, Path(app.outdir) / "lectures")
 
 

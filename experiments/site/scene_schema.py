@@ -121,7 +121,9 @@ def _scenes(kind: str) -> list[dict[str, Any]]:
         pairs = [pair, pair | {"law": "orthotropic", "mu": [0.1, 0.2], "direction": along}]
         made.append(solve | own | {"bodies": {"a": body, "b": {"rigid": rigid}}, "contacts": pairs})
     block: dict[str, Any] = {"material": material, **shapes["block"]}
-    made.append({"contacts": "auto", "mu": 0.1, "bodies": {"a": block, "b": block}})
+    bolt = {"between": ["a.x-", "b.x-"], "force": [0.0, 1.0], "direction": along}
+    blocks = {"contacts": "auto", "mu": 0.1, "bodies": {"a": block, "b": block}}
+    made += [blocks, blocks | {"bolts": [bolt]}]
     for height in surfaces:
         half = points | {"height": height, "force": path, "displacement": along}
         bodies = {"b": {"rigid": {}}, "a": {"material": "steel", "half_space": half}}

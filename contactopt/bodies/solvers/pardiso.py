@@ -65,6 +65,7 @@ class PardisoSolver(BodySolver):
     order = 2  # METIS; 0 is minimum degree
 
     def __init__(self, system: System):
+        library()  # first, so that pypardiso need not search for it
         try:
             from pypardiso.pardiso_wrapper import PyPardisoError
         except ImportError as error:
@@ -72,7 +73,6 @@ class PardisoSolver(BodySolver):
                 "the body solver 'pardiso' needs the package pypardiso: pip install pypardiso."
             ) from error
         super().__init__(system)
-        library()  # so that pypardiso need not search for it
         self.upper = sp.triu(system.A, format="csr")
         self.upper.sort_indices()
         self._lock = Lock()

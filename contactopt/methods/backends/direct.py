@@ -17,12 +17,10 @@ from contactopt.methods.backends.conic import check_semidefinite
 
 @dataclass(eq=False)
 class CoulombSOCP:
-    """min r' Q r / 2 + c' r  subject to  |r_t| <= mu r_n at each contact,  V' r + s = 0, for many
-    c.
+    """min r' Q r / 2 + c' r subject to |r_t| <= mu r_n at each contact, V' r + s = 0, for many c.
 
-    Q (k dim, k dim) symmetric positive semidefinite, mu (k,), V (k dim, p), s (p,). As rows A r + y
-    = b: y = 0 for the balance and for the tangential part of contacts with mu = 0; y >= 0 for their
-    normal part; y in the second-order cone for the others.
+    In the rows A r + y = b, y is zero for the balance and where mu = 0, y >= 0 for normal forces,
+    and y lies in second-order cones for the others.
     """
 
     solver: Any

@@ -16,11 +16,7 @@ from contactopt.methods.backends.child import Child
 
 @dataclass(eq=False)
 class BoxQP:
-    """min x'Px/2 + c'x  subject to  A x = b,  low <= x <= high, for one P and A and many c, b and
-    bounds.
-
-    P (n, n) symmetric positive semidefinite, A (p, n).
-    """
+    """min x'Px/2 + c'x subject to A x = b, low <= x <= high, for one P (n, n) and A (p, n)."""
 
     backend: Backend
     P: np.ndarray
@@ -39,11 +35,8 @@ class BoxQP:
         high: np.ndarray,
         start: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """x (n,) and the multipliers y (p,) of A x = b, with P x + c + A'y balancing the bounds'
-        forces.
-
-        BackendError if the backend crashes or its answer is not finite. Its claims are not
-        believed.
+        """x (n,) and the multipliers y (p,) of A x = b, which are checked, not believed.
+        BackendError if the backend crashes or its answer is not finite.
         """
         import qpsolvers
 

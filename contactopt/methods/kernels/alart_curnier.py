@@ -42,13 +42,9 @@ def coulomb_equations(
     weight: float = 0.0,
     stiffer: np.ndarray | float = 1.0,
 ) -> Equations:
-    """Write the Alart-Curnier equations of a problem, with rho_i = 1 over the mean compliance of
-    contact i.
-
-    A proximal term of that `weight`, a compliance, counts from the forces `center` (k, dim). The
-    compliance that Newton's steps should see is smaller than the diagonal of Q by `stiffer`, (k,)
-    or one number. Source: Alart, Curnier (1991), A mixed formulation for frictional contact
-    problems prone to Newton like solution methods.
+    """The Alart-Curnier equations (1991), with rho_i = 1 over the mean compliance of contact i. A
+    proximal term of that `weight`, a compliance, counts from `center` (k, dim). The compliance that
+    Newton's steps should see is smaller than the diagonal of Q by `stiffer`, (k,) or a number.
     """
     compliance = diagonal(problem.Q).reshape(problem.q.shape).mean(axis=1) / stiffer + weight
     rho = 1 / np.maximum(compliance, 1e-3)
@@ -57,10 +53,8 @@ def coulomb_equations(
 
 
 def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Forces within the bounds of the law to the last digit, at the solution equal to r (k, dim):
-    P(y) = r + error. Thin bodies between several pairs of surfaces are much softer under smooth
-    forces than 1 / rho, so that P(y) would make a displacement of the rounding of u; there r is
-    projected.
+    """Forces within the bounds of the law to the last digit, P(y) = r + error. Where thin bodies
+    are so soft that P(y) would displace by the rounding of u, r is projected instead.
     """
     if len(problem.pairs) == 1:
         return r + error
@@ -114,11 +108,9 @@ def solver_of(problem: InterfaceProblem) -> Solve:
 def cold_start(
     problem: InterfaceProblem, solve: Solve | None = None, accuracy: float = 0.0
 ) -> Iterate:
-    """Find the bonded solution of a dimensionless problem, from which Newton's method starts, to a
-    relative accuracy; by default with factors.
-
-    Without a plate the start has no force at all, if its residual is smaller: forces that bond
-    rigid bodies are of any size, but on elastic bodies Newton's method cycles from no force.
+    """The bonded solution of a dimensionless problem, to a relative accuracy. Without a plate no
+    force at all, if its residual is smaller: forces that bond rigid bodies are of any size, but on
+    elastic bodies Newton's method cycles from no force.
     """
     zero = np.zeros(problem.q.shape), np.zeros(len(problem.s))
     glued = glued_contacts(problem)
@@ -148,11 +140,9 @@ def _bonded(problem: InterfaceProblem, glued: np.ndarray) -> Iterate | None:
 
 
 def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
-    """Choose the contacts (k,) that the bonded solution of a dimensionless problem glues.
-
-    They are those that would penetrate and, where loads press free bodies together, those whose gap
-    is at most the least approach q_i + Q_ii F of a contact i that bears the load F of its pair
-    alone. All are glued where the near ones alone would leave a motion free.
+    """The contacts (k,) that the bonded solution glues: those that would penetrate and, where loads
+    press free bodies together, those whose gap is at most the least approach q_i + Q_ii F of a
+    contact i that bears the load F of its pair alone. All, where these leave a motion free.
     """
     gap = problem.q[:, 0]
     closed = np.asarray((problem.law.lowest < 0) | (gap < 0))

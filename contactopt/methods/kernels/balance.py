@@ -39,15 +39,9 @@ def project_balanced(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solve r = P(y - rho V lambda), V' r + s = 0 for r (k, d) and lambda (p,).
-
-    If no r in the set keeps the balance, the r of the last lambda comes back.
-
-    project      P and its derivative; P is a projection on a closed convex set that holds zero
-    y            (k, d) the point that is projected
-    V, s         (k d, p) rigid motions and (p,) resultants
-    step         rho, greater than 0: one number or one per contact (k,)
-    multipliers  (p,) where lambda starts;  steps  of Newton's method at most
+    """Solve r = P(y - rho V lambda), V' r + s = 0 for r (k, d) and lambda (p,), from `multipliers`,
+    in at most so many Newton `steps`; P projects on a closed convex set that holds zero, and
+    `step` is rho > 0. Without a solution the r of the last lambda comes back.
     """
     lam = multipliers
     if len(s) == 0:
@@ -55,7 +49,8 @@ def project_balanced(
     k, d = y.shape
     rho = np.broadcast_to(np.asarray(step, dtype=float), (k,))[:, None]
     size = np.abs(s) + np.abs(V).sum(axis=0) * 1e-3
-    ridge = CURVATURE * np.diag(np.sum(rho[:, :, None] * V.reshape(k, d, -1) ** 2, axis=(0, 1)))
+    felt = np.sum(rho[:, :, None] * V.reshape(k, d, -1) ** 2, axis=(0, 1))
+    ridge = CURVATURE * np.diag(np.where(felt > 0, felt, 1.0))  # no force feels some motions
     z = y - rho * (V @ lam).reshape(k, d)
     for _ in range(steps):
         check_time()

@@ -47,7 +47,8 @@ from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
-USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.ways`)
+# V-cycles of all bodies for the bonded solution (`python -m experiments.questions.large_punch`)
+USUAL = 8
 IDLE = 3  # steps without progress after which it begins anew
 
 
@@ -124,10 +125,9 @@ class Coupled:
         return State(X, r.reshape(self.equations.q.shape), multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
-        """The forces r + error, at the solution equal to r, with what Q makes of them.
-
-        One V-cycle improves the displacements. The accuracy stated is that before it: the energy
-        (f'Bf)^1/2 of the missing forces f over that of the displacements.
+        """The forces r + error, at the solution equal to r, with what Q makes of them. One V-cycle
+        improves the displacements; the accuracy stated is that before it, the energy (f'Bf)^1/2 of
+        the missing forces f over that of the displacements.
         """
         r = at.r + error
         return r, at.multipliers, improved(self.form, at.X, r)
@@ -155,11 +155,9 @@ class CoupledAt:
 
 
 class CoupledSteps:
-    """Newton's method on contacts and bodies, from the bonded solution or a given start.
-
-    `form` is the dimensionless problem's Q before condensation. Where the residual does not fall
-    for more than IDLE steps, a rough start has led the sorting of the contacts into a circle, and
-    the iteration begins anew, once, from an accurate bonded solution.
+    """Newton's method on contacts and bodies. Where the residual does not fall for IDLE steps, a
+    rough start has led the sorting of contacts into a circle: it begins anew, once, from an
+    accurate bonded solution.
     """
 
     def __init__(self, problem: InterfaceProblem, preconditioner: str | None):
@@ -230,14 +228,13 @@ class CoupledSteps:
 
 
 def fitted(P: Preconditioner, form: CoupledForm, V: np.ndarray) -> Preconditioner:
-    """Scale a preconditioner P and its model so that the eigenvalues of P Q lie about 1 /
-    SCHUR_MARGIN where a random balanced force does most of its work.
+    """Scale a preconditioner P so that the eigenvalues of P Q lie about 1 / SCHUR_MARGIN where a
+    random force does most of its work, with one V-cycle for Q.
 
-    One V-cycle stands for the product with Q. A block triangular preconditioner wants a Schur
-    complement that is rather too large than too small. Forces that are not in balance tell nothing:
-    a body that no support holds is held at a few nodes meanwhile, where they are taken up, and the
-    V-cycle knows the large motion that follows to a few digits only. So x has V'x = 0 for the
-    motions V (n, p) of the multipliers, and of Q x counts what no motion V lambda can undo.
+    A block triangular preconditioner wants a Schur complement that is rather too large. Only forces
+    in balance tell: a body without supports is held at a few nodes meanwhile, and the V-cycle knows
+    the large motion that follows to few digits. So V'x = 0, and of Q x counts what no motion can
+    undo.
     """
     # The mean eigenvalue of P Q, weighted with the work of the force: (Qx)' P (Qx) over x' Qx.
     x = np.random.default_rng(0).normal(size=P.shape[0])

@@ -54,12 +54,9 @@ class Sweeps:
     def __call__(
         self, r: np.ndarray, count: int, share: float = 1.0, enough: float = -1.0
     ) -> tuple[float, int]:
-        """Sweep at most `count` times, and change r (k, dim) in place.
-
-        share   fraction of each local change that is taken
-        enough  change of a sweep over the forces that ends them
-
-        Returns the change of the last sweep over the forces, and the number of sweeps.
+        """Sweep at most `count` times, and change r (k, dim) in place, by this `share` of each
+        local change, until a sweep changes less than `enough` of the forces. Returns the change of
+        the last sweep over the forces, and the number of sweeps.
         """
         change, done = sweeps.sweep(*self.fixed, r, count, share, enough)
         return float(change), int(done)

@@ -37,16 +37,12 @@ BACKTRACKS = 30  # shortenings of a step, which leave a thousandth of it
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Which path to a solution is followed.
+    """Which path to a solution is followed; on jammed packings many end early.
 
-    On jammed packings many paths end early, and another one does not.
-
-    full    |u_t| is linearised in every step, with shorter steps; else not after a step that had to
-            be short
-    smooth  |u_t| is replaced by (|u_t|^2 + (smooth z_n)^2)^1/2, which has no kink where a contact
-            begins to slip the other way; its derivative by z_n is left out. The end of the path is
-            a solution but for terms of order smooth^2
-    first   r_n mu and z_n / mu of the first point, (2,) or one for every contact, (2, k)
+    full    |u_t| is linearised in every step; else not after a step that had to be short
+    smooth  |u_t| becomes (|u_t|^2 + (smooth z_n)^2)^1/2, without a kink where slip turns round; the
+            end is a solution up to terms of order smooth^2
+    first   r_n mu and z_n / mu of the first point, (2,) or (2, k)
     """
 
     full: bool = True
@@ -146,10 +142,8 @@ class System:
 def interior_iterates(
     problem: InterfaceProblem, matrix: Blocks, path: Path | None = None
 ) -> Iterator[tuple[Iterate, float]]:
-    """Iterate the interior-point method on a dimensionless problem whose Q is `matrix`.
-
-    Yields a point (r (k, dim), lambda (p,)) in the cones, and how far it is from a solution: the
-    largest of the mean complementarity, the error of the law and that of the balance [-].
+    """Iterates of the interior-point method on a dimensionless problem with Q `matrix`: a point in
+    the cones, and the largest of its mean complementarity, error of the law and of the balance [-].
     """
     path, cones = path or Path(), Lorentz(problem, matrix)
     # The first point lies on the axes of both cones, so that it is in their middle.

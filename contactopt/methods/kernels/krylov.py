@@ -49,12 +49,10 @@ FLAT = 1e-8  # eigenvalues of D below this are zero
 def model_of(
     problem: InterfaceProblem, name: str | None = None, deflate: bool = True
 ) -> Preconditioner:
-    """The preconditioner of a problem by its name in PRECONDITIONERS, or 'none' for the identity.
-
-    By default it is `neumann` where the contacts lie on a grid, `laplacian` on other surfaces whose
-    cells are known, else the identity, with a note that says why. With `deflate` the smooth motions
-    of the bodies are solved for exactly, which costs a few products with Q. InputError if the
-    preconditioner that was named is unknown or does not fit the contacts.
+    """The preconditioner of a problem by its name, or 'none'. By default `neumann` where contacts
+    lie on a grid, `laplacian` where the cells of a surface are known, else the identity, with a
+    note. With `deflate` smooth motions are solved for exactly. InputError for one that does not
+    fit.
     """
     missing: list[str] = []
     for choice in ("neumann", "laplacian") if name is None else (name,) * (name != "none"):

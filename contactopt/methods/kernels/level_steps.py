@@ -33,9 +33,8 @@ Act = Callable[[np.ndarray], np.ndarray]
 
 
 class GridSteps:
-    """Newton's method on one grid, until the residual is `enough` of the forces; forces below
-    `least` count as so much. No step need come further than that. Where the residual does not fall,
-    the contacts to blame are solved by themselves.
+    """Newton's method on one grid, until the residual is `enough` of the forces, which count as
+    `least` at least. Where it does not fall, the contacts to blame are solved by themselves.
     """
 
     def __init__(self, level: Level, enough: float, least: float = 0.0):

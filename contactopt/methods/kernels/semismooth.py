@@ -178,10 +178,9 @@ def crossover(
 def certified(
     solvers: Iterable[tuple[str, Callable[[], Iterate]]], equations: Equations
 ) -> Iterate:
-    """Ask backends (name, solve), one after the other, until Newton steps make an answer exact.
-
-    A backend may call anything optimal, so that every answer is checked by its residual. Without an
-    exact answer the best is returned; BackendError if even its relative residual is above WRONG.
+    """Ask backends (name, solve) in turn, until Newton steps make an answer exact, since a backend
+    may call anything optimal. Else the best; BackendError if even its relative residual is above
+    WRONG.
     """
     best, asked = (np.inf, np.zeros(0), np.zeros(0)), ""
     for attempt, (asked, solver) in enumerate(solvers):

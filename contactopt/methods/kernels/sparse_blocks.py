@@ -77,9 +77,9 @@ class Blocks:
         border: Border,
         regular: bool,
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """x (m,) and lambda (p,) of A x + B lambda = right (m,), V' x = balance (p,), where A is
-        the system of `factor` and `border` is V, B, balance; None if singular. Where A is `regular`
-        lambda need not be unique.
+        """x (m,) and lambda (p,) of A x + B lambda = right, V' x = balance, with A the system of
+        `factor` and `border` V, B, balance; None if singular. Where A is `regular` lambda need not
+        be unique.
         """
         solver = self.factor(left, added, kept)
         return None if solver is None else bordered(solver, right, *border)
@@ -205,9 +205,8 @@ def block_matrix(Q: Interface, d: int) -> Blocks:
 def bordered(
     solve: Solver, right: np.ndarray, V: np.ndarray, left: np.ndarray, balance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Solve A x + left lambda = right (m,) and V' x = balance (p,), given a solver with A.
-
-    lambda follows by least squares where it is not unique. None if a number is not finite.
+    """Solve A x + left lambda = right (m,) and V' x = balance (p,), given a solver with A; lambda
+    by least squares where not unique. None if a number is not finite.
     """
     p = len(balance)
     x = solve(np.column_stack([right, left]) if p else right[:, None])

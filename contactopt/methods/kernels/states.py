@@ -158,9 +158,9 @@ class StateTree:
         return self.unit[1 : self.n : 3], self.unit[2 : self.n : 3]
 
     def points(self) -> Iterator[Point | None]:
-        """Forces (k, dim), multipliers (p,) and, in the plane, zero sides (3 k, 2) of each branch
-        in which all states are decided, and None after every other branch. In space it is a
-        solution, or near to one if there is any.
+        """Forces, multipliers and, in the plane, zero sides (3 k, 2) of each branch whose states
+        are all decided, and None after every other branch. In space it is a solution, or near to
+        one.
         """
         waiting = [self.root]
         while waiting:
@@ -173,6 +173,7 @@ class StateTree:
                 continue
             x = branch.x()
             r, lam = x[: self.n].reshape(self.problem.q.shape), x[self.n :]
+            r[branch.sides[: len(r), 1]] = 0.0  # of open contacts, without rounding
             u = self.problem.displacements(r, lam)
             more = (self._plane if self.problem.dim == 2 else self._space)(branch, r, u)
             waiting += more

@@ -37,9 +37,8 @@ class KrylovSubproblem:
         self.compliance = compliance[:, 0] if normal else compliance[:, 1:].mean(axis=1)
 
     def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
-        """r (k, dim) with its own components new, and the multipliers (columns,): active sets from
-        r, or from the glued solution. Where they cycle, the proximal loop
-        (contactopt.methods.proximal); BackendError if that does not come near a solution either.
+        """r (k, dim) with its own components new, and the multipliers, by active sets; where these
+        cycle, by the proximal loop. BackendError if that does not come near a solution either.
         """
         equations = self._equations(r, multipliers, 0.0, 0.0)
         point = r, multipliers[self.columns]

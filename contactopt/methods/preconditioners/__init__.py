@@ -153,9 +153,8 @@ def _blocks(problem: InterfaceProblem, parts: list[Preconditioner]) -> Precondit
 
 
 def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
-    """Forces (k dim, j) that are smooth on every pair of surfaces: polynomials of the place, in
-    every component, of a degree that grows with the length of a pair over the distance to the next
-    pair. Longer waves reach it through the body in between, which no model of one pair knows.
+    """Forces (k dim, j) that are polynomials of the place on every pair of surfaces, of a degree
+    that grows with its length over the distance to the next pair: longer waves reach that pair.
     """
     parts = [
         _smooth_motions(part_of(problem, pair), degree)

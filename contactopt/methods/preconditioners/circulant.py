@@ -47,10 +47,8 @@ def extended(grid: Grid) -> tuple[GridMap, None]:
 
 def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
     """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients, and
-    its inverse.
-
-    The spacing h of eq (28) is measured in quarters of the contact line's length, so that units do
-    not matter. Raises InputError on a surface, where the paper defines no P22.
+    its inverse. The spacing h of eq (28) is in quarters of the contact line. InputError on a
+    surface.
     """
     if len(grid.shape) > 1:
         raise InputError(

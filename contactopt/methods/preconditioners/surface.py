@@ -55,10 +55,7 @@ Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
     """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of
-    one. InputError if the problem does not know the cells of its contact surface.
-
-    `held` (k, dim) are the components that cannot move. The mean diagonal is an estimate by random
-    signs (Hutchinson 1989).
+    one, an estimate by random signs (Hutchinson 1989). InputError without cells.
     """
     cells = problem.chart.cells
     if cells is None:

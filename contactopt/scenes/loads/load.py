@@ -26,20 +26,41 @@ class Given(NamedTuple):
     reading: Reading
 
 
+class Face(NamedTuple):
+    """The face of a mesh on which a load acts.
+
+    normal      (dim,) the mean of the outward normals, of length 1
+    area        of the whole body [length^2]
+    centre      (dim,) of the area
+    components  of a displacement
+    held        components of which supports hold a node of the face, or revolution all
+    """
+
+    normal: np.ndarray
+    area: float
+    centre: np.ndarray
+    components: tuple[str, ...]
+    held: frozenset[str]
+
+
 class Load(ABC):
     """A load on a body: a frozen dataclass.
 
     what      it is, in messages
     form      of the names of its values (contactopt.scenes.parameters)
     boundary  where it acts; empty: inside the whole body
-    level     whether it keeps its boundary level and gives its total force, as a Plate, whose
-              fields it then has. Any other load is known by its density
+    level     whether it keeps its boundary level, as a Plate, whose fields it then has. Any other
+              load is known by its density
+    total     whether its values are total forces, those of all mirror images together
+    shared    whether it is one of the two ends of a load of the scene
     single    whether a scene file has one table of it for a body, and not an array of tables
     """
 
     what: ClassVar[str]
     form: ClassVar[str]
     level: ClassVar[bool] = False
+    total: ClassVar[bool] = False
+    shared: ClassVar[bool] = False
     single: ClassVar[bool] = False
     boundary: str
     force: Mapping[str, float]
@@ -58,9 +79,22 @@ class Load(ABC):
         """InputError for values that do not fit the kind of the scene."""
 
     @classmethod
-    @abstractmethod
     def read(cls, given: Given) -> Self:
-        """The load that a scene file gives."""
+        """The load that the table of a body in a scene file gives."""
+        raise NotImplementedError
+
+    def address(self, body: str) -> tuple[str, ...]:
+        """What is between the kind and the component in the names of its values."""
+        return tuple(filter(None, (body, self.boundary)))
+
+    def on(self, face: Face) -> Load:
+        """The load that it is on a face of a mesh."""
+        return self
+
+    def resultant(self, components: tuple[str, ...], n: np.ndarray) -> np.ndarray:
+        """The total force (dim,), of a load that gives it, on a face of the mean normal n."""
+        values = self.values(components)
+        return np.array([values.get(c, 0.0) for c in components])
 
     def density(self, x: np.ndarray, n: np.ndarray) -> np.ndarray:
         """The force per area or volume at places x, where n points outwards, all (dim, ...)."""

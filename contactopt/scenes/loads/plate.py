@@ -21,6 +21,7 @@ class Plate(Load):
     what = "plate"
     form = "force:BODY:COMPONENT"
     level = True
+    total = True
     boundary: str
     force: Mapping[str, float]
     glued: bool = True

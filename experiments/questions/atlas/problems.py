@@ -21,6 +21,10 @@ from experiments.peers import pinocchio_admm, siconos_numerics
 FAILED = 1e-6  # certificate above which a method has failed
 PEERS = {"siconos": siconos_numerics.PEER, "pinocchio": pinocchio_admm.PEER}
 PEER_ITERATIONS, PEER_SECONDS = 10_000, 10.0  # of a peer on one problem; ours have 500 iterations
+LIMITS: dict[str, dict[str, Any]] = {
+    "siconos": {"option": f"IPARAM_MAX_ITER={PEER_ITERATIONS}", "local": ""},
+    "pinocchio": {"max_iterations": PEER_ITERATIONS},
+}
 LONG = 600.0  # s that any run on so few contacts ends in
 ENDLESS = "infeasible", "refused", "time_limit"  # no failures
 # every mechanism that is looked for, and how often it takes part in a problem drawn at random
@@ -216,8 +220,8 @@ def run(name: str, case: Case, seconds: float = LONG, **settings: Any) -> End:
         if peer in PEERS:
             plane = problem.dim == 2 and solver in siconos_numerics.SOLVERS[2]
             dims = (2,) if peer == "siconos" and plane else (3,)
-            settings = {"solver": solver, "iterations": PEER_ITERATIONS}
-            answer = PEERS[peer].answer(problem, 1e-8, PEER_SECONDS, dims, **settings)
+            given = LIMITS[peer] | {"solver": solver}
+            answer = PEERS[peer].answer(problem, 1e-8, PEER_SECONDS, dims, **given)
             if answer.reactions is None:
                 return End(np.inf, answer.status, np.nan, np.zeros((0, 1)), np.zeros(0))
             residual = natural_map_residual(problem, answer.reactions)
