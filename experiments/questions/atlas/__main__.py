@@ -120,14 +120,20 @@ def report(rows: list[Row], seeds: list[Row]) -> str:
         "sections": "\n\n".join(section(row, WORDS[row["method"]]) for row in rows),
         "environment": environment(),
         "own": sum("case" in row for row in rows if " " not in row["method"]),
-        "hits": sum(int(row["within 5 %"]) for row in errors),
-        "seeds": len(seeds),
+        "hits": hits(seeds, False),
+        "peers": hits(seeds, True),
         "auto": f"{total(rows[0], 'tried'):,}",
     }
     text = template(__file__)
     for key, value in parts.items():
         text = text.replace("{" + key + "}", str(value))
     return text
+
+
+def hits(seeds: list[Row], peers: bool) -> str:
+    """How many thresholds were observed near their prediction."""
+    seen = [np.isfinite(row["observed"]) for row in seeds if (" " in row["method"]) == peers]
+    return f"{int(sum(seen))} of {len(seen)}"
 
 
 def section(row: Row, words: dict[str, Any]) -> str:
@@ -140,8 +146,11 @@ def section(row: Row, words: dict[str, Any]) -> str:
             f"The smallest failing problem has {numbers(case)} The method {row['what']}, at a"
             f" certificate of {row['residual']:.1e}. {words['mechanism']}{taken(words)}"
         )
+    elif failed := total(row, "failed"):
+        again = "but not when these were run again"
+        lines.append(f"It failed on {failed} of {total(row, 'tried')} searched problems, {again}.")
     else:
-        lines.append(f"None of {total(row, 'tried')} searched problems makes it fail.")
+        lines.append(f"None of {total(row, 'tried'):,} searched problems makes it fail.")
     if " " not in name:
         lines.append(f"![{name}]({name}.png)")
     return "\n\n".join(lines)
