@@ -13,6 +13,7 @@ import skfem
 
 from contactopt.bodies.elements import Trace, Weight, node_unknowns
 from contactopt.bodies.motions import Motions
+from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.errors import InputError
 from contactopt.material import Material
@@ -64,6 +65,10 @@ class Matrices:
     def contact_dofs(self) -> np.ndarray:
         """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
         return np.asarray(self.unknowns[:, self.surface_nodes].T)
+
+    def solver(self, system: System) -> BodySolver | None:
+        """Its own solver on free unknowns; None: one of contactopt.bodies.solvers."""
+        return None
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
         """The derivative (n,) of the elastic forces by 'E' or 'nu' at fixed U."""

@@ -7,6 +7,7 @@ are those of the whole body.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -282,16 +283,19 @@ def _mirrored_nodes(
 
 
 @dataclass
-class _Constraints:
+class Constraints:
     """What supports and plates do to the n unknowns of a body, one after the other.
 
-    held  (n,) mask of the unknowns that are not free;   columns  (n,) unit motion of each plate
-          component that moves. The others are as in Assembly.
+    numbers  (dim, nodes) the unknowns of each node
+    nodes    function from the name of a boundary to the nodes on it
+    held     (n,) mask of the unknowns that are not free
+    columns  (n,) unit motion of each plate component that moves. The others are as in Assembly.
     """
 
     scene: Scene
-    part: Part
-    basis: skfem.CellBasis
+    part: Any
+    numbers: np.ndarray
+    nodes: Callable[[str], np.ndarray]
     prescribed: np.ndarray
     held: np.ndarray
     columns: list[np.ndarray] = field(default_factory=list)
@@ -306,9 +310,8 @@ class _Constraints:
 
     def unknowns(self, boundary: str, component: str) -> np.ndarray:
         """Those of one component on a boundary."""
-        facets = np.asarray(self.basis.mesh.boundaries[boundary])
-        own = node_unknowns(self.basis)[self.scene.components.index(component)]
-        return np.unique(own[nodes_on(self.basis, self.scene.degree, facets)])
+        own = self.numbers[self.scene.components.index(component)]
+        return np.unique(own[self.nodes(boundary)])
 
     def hold(self, name: str, where: np.ndarray) -> None:
         """Let the support or plate of that name hold unknowns that nobody else holds."""
@@ -357,11 +360,18 @@ class _Constraints:
                 )
             self.hold(f"plate '{plate.boundary}'", where)
 
+    def add_all(self) -> Constraints:
+        """Those of all supports and plates of the part."""
+        self.add_supports()
+        for load in self.part.loads:
+            if load.level:
+                self.add_plate(load)
+        return self
 
-def _constrained(scene: Scene, part: Part, basis: skfem.CellBasis) -> _Constraints:
-    made = _Constraints(scene, part, basis, np.zeros(basis.N), np.zeros(basis.N, dtype=bool))
-    made.add_supports()
-    for load in part.loads:
-        if load.level:
-            made.add_plate(load)
-    return made
+
+def _constrained(scene: Scene, part: Part, basis: skfem.CellBasis) -> Constraints:
+    def nodes(boundary: str) -> np.ndarray:
+        return nodes_on(basis, scene.degree, np.asarray(basis.mesh.boundaries[boundary]))
+
+    none = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
+    return Constraints(scene, part, node_unknowns(basis), nodes, *none).add_all()
