@@ -263,6 +263,6 @@ def check_refinable(scene: Scene) -> None:
     """InputError, before anything is solved, for a scene that has no mesh to refine."""
     if not any(hasattr(part, "mesh") for part in scene.parts):
         raise InputError(
-            f"scene '{scene.name}' has no mesh to refine: give the points of its half-spaces as a"
-            " function (elements, zone) -> points."
+            f"scene '{scene.name}' has no mesh to refine: give the points of half-spaces as a"
+            " function (elements, zone) -> points; bodies by matrices are as fine as they are."
         )

@@ -53,7 +53,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
     part = placed(scene, part, basis, weight)
     A = isotropic_stiffness(basis, kind.constants(part.material), weight)
-    fixed = _constrained(scene, part, basis)
+    fixed = _constraints(scene, part, basis).add_all()
     if fixed.held.all():
         raise InputError(
             f"body '{part.name}' is held at all its nodes, so that nothing of it deforms; hold"
@@ -96,7 +96,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     """The body with the loads of another scene; InputError if other unknowns are held or driven."""
     part = placed(scene, part, body.basis, body.weight)
-    fixed = _constrained(scene, part, body.basis)
+    fixed = _constraints(scene, part, body.basis).add_all()
     held = np.array_equal(np.flatnonzero(~fixed.held), body.free)
     if not held or not np.array_equal(fixed.motion, body.motion):
         raise InputError(
@@ -214,7 +214,7 @@ def face_of(
             f"body '{part.name}': the normals of {boundary!r} point around, and have no mean along"
             " which a bolt could pull; name a face with one side."
         )
-    held = _Constraints(scene, part, basis, np.zeros(basis.N), np.zeros(basis.N, dtype=bool))
+    held = _constraints(scene, part, basis)
     held.add_supports()
     fast = {c for c in scene.components if held.held[held.unknowns(boundary, c)].any()}
     fast |= {scene.components[0]} if scene.analysis.revolved else set()
@@ -369,9 +369,9 @@ class Constraints:
         return self
 
 
-def _constrained(scene: Scene, part: Part, basis: skfem.CellBasis) -> Constraints:
+def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> Constraints:
     def nodes(boundary: str) -> np.ndarray:
         return nodes_on(basis, scene.degree, np.asarray(basis.mesh.boundaries[boundary]))
 
     none = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
-    return Constraints(scene, part, node_unknowns(basis), nodes, *none).add_all()
+    return Constraints(scene, part, node_unknowns(basis), nodes, *none)

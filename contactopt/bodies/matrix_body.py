@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -37,6 +38,12 @@ from contactopt.problem.laws import find_law
 from contactopt.scenes.matrix_part import MatrixPart
 from contactopt.scenes.scene import Scene
 
+# (dimension, points of a facet) -> what VTK calls it
+CELLS = {
+    (2, 2): "line", (2, 3): "line3", (3, 3): "triangle", (3, 4): "quad", (3, 6): "triangle6",
+    (3, 8): "quad8", (3, 9): "quad9",
+}  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class GivenMatrices(Matrices):
@@ -45,6 +52,7 @@ class GivenMatrices(Matrices):
     surfaces  name of each contact surface -> the surface
     moving    (dim N, n) D: the displacements of the points in the caller's numbering
     solves    function that solves K U = F, if K itself is not known
+    facets    name of each surface -> (m, j) points of its facets, as they are given
     """
 
     unknowns: np.ndarray
@@ -52,6 +60,7 @@ class GivenMatrices(Matrices):
     surfaces: Mapping[str, Surface]
     moving: sp.csr_matrix
     solves: Callable[[np.ndarray], np.ndarray] | None
+    facets: Mapping[str, np.ndarray]
 
     @property
     def contact_dofs(self) -> np.ndarray:
@@ -61,6 +70,25 @@ class GivenMatrices(Matrices):
     def at_points(self, U: np.ndarray) -> np.ndarray:
         """(dim, N) displacements of the points, from those of the unknowns (n,)."""
         return np.asarray((self.moving @ U)[self.unknowns])
+
+    def write_vtu(self, path: Path, U: np.ndarray, force: np.ndarray) -> None:
+        """Write the points and the facets of all surfaces with the displacement, the contact forces
+        and, where K is known, the forces of supports and plates at the points.
+        """
+        import meshio
+
+        data = {"displacement": self.at_points(U), "force": force[self.unknowns]}
+        if self.solves is None:
+            missing = self.A @ U - self.load - force
+            missing[self.free] = 0.0
+            data["reaction"] = missing[self.unknowns]
+        lack = 3 - len(self.locations)
+        cells = [
+            (CELLS[len(self.locations), facets.shape[1]], facets) for facets in self.facets.values()
+        ]
+        vectors = {name: np.pad(each, ((0, lack), (0, 0))).T for name, each in data.items()}
+        points = np.pad(self.locations.T, ((0, 0), (0, lack)))
+        meshio.Mesh(points, cells, vectors).write(path, file_format="vtu")
 
     def solver(self, system: System) -> BodySolver | None:
         return None if self.solves is None else _GivenSolver(system, self)
@@ -147,7 +175,7 @@ class MatrixBody(AssembledBody):
         except RuntimeError as error:
             if "singular" not in str(error):
                 raise
-            raise without_stiffness(self.body, "") from error
+            raise without_stiffness(self.body) from error
         check_definite(self.body, made, self.body.solves is None)
         if self.body.solves is None:
             return made
@@ -188,6 +216,7 @@ def assemble_matrices(
         surfaces,
         D,
         part.solves,
+        {name: np.asarray(own, dtype=int) for name, own in part.facets.items()},
     )
     return MatrixBody(body, part)
 

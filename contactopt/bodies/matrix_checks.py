@@ -1,5 +1,5 @@
 """Whether a stiffness that another code has assembled is that of a body, and how it is numbered:
-found by its rigid motions, which need no force, and by the signs of its pivots.
+found by its rigid motions, which need no force, and by its extreme eigenvalues.
 """
 
 from __future__ import annotations
@@ -13,13 +13,15 @@ import scipy.sparse as sp
 from contactopt.bodies.assembly import Matrices
 from contactopt.bodies.elastic import ElasticBody
 from contactopt.bodies.motions import EXACT, Motions, kernel, motion_labels, rigid_fields
+from contactopt.bodies.solvers.system import Act
 from contactopt.checks import real_array
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import Kind
 from contactopt.scenes.matrix_part import MatrixPart
 
 BALANCED = 1e-7  # sum of the forces of a rigid motion over their sizes: below it, it is rounding
-PIVOT = 1e-12  # of the largest entry: a pivot below it belongs to a motion without stiffness
+PIVOT = 1e-13  # of the largest eigenvalue: one below it belongs to a motion without stiffness
+STEPS = 12  # of Lanczos's method
 SAME = 1e-8  # x' K^-1 y and y' K^-1 x of a function that solves may differ by this fraction
 
 
@@ -29,12 +31,14 @@ class Numbering(NamedTuple):
     numbers   (dim, N) of each point;   R  (n, m) rigid motions of the unknowns
     resisted  (rows, m) forces, and gaps in the constraints, that they make, each row of size one
     share     of the unknowns whose rows of K no rigid motion loads
+    turned    the first of those that a rotation loads and no translation does, if there is one
     """
 
     numbers: np.ndarray
     R: np.ndarray
     resisted: np.ndarray
     share: float
+    turned: tuple[int, ...]
 
 
 def _numbering(
@@ -53,9 +57,13 @@ def _numbering(
     tried = (np.diff(K.indptr) > 1) & sizes.any(axis=1)
     rows = loaded[tried & loaded.any(axis=1)]
     rows = rows / np.abs(rows).max(axis=1, keepdims=True)
-    rows = np.concatenate([rows, gaps[np.abs(gaps).max(axis=1, initial=0.0) > EXACT]])
+    gaps = gaps[np.abs(gaps).max(axis=1, initial=0.0) > EXACT]
+    rows = np.concatenate([rows, gaps])
     share = np.sum(tried & ~loaded.any(axis=1)) / max(tried.sum(), 1)
-    return Numbering(numbers, R, rows, float(share))
+    still = ~loaded[:, : len(x)].any(axis=1)
+    told = not (kind.revolved or len(gaps))
+    turned = np.flatnonzero(tried & still & loaded.any(axis=1) & told)
+    return Numbering(numbers, R, rows, float(share), tuple(turned[:1].tolist()))
 
 
 def numbered(
@@ -89,6 +97,12 @@ def numbered(
         raise InputError(
             f"{name}: K resists rigid motions of the points in the order '{stated}', and fewer of"
             f" them in the order '{best}'; take that one, or 'auto'."
+        )
+    if own.turned:
+        raise InputError(
+            f"{name}: K resists rotations of the points and no translations, as at unknown"
+            f" {own.turned[0]}: coordinates have another unit along one axis, lack an offset or are"
+            " in another order than the unknowns."
         )
     if own.share == 0 and (stated == "auto" or not reduced):
         raise InputError(
@@ -152,39 +166,59 @@ def free_motions_of(
 
 def check_definite(body: Matrices, made: ElasticBody, known: bool) -> None:
     """Refuse a stiffness with a negative eigenvalue or without stiffness against some motion, as
-    its factors show it; where it is not `known`, two vectors show what its solver is.
+    far as a few steps of Lanczos's method with K and with its inverse find one; where K is not
+    `known`, also a solver that is not linear and symmetric.
     """
+    kept, solve = made.kept, made.solver.solve
+    start = np.random.default_rng(0).standard_normal(len(kept))
     if not known:
-        a, b = np.random.default_rng(0).standard_normal((2, len(made.kept)))
-        x, y = made.solver.solve(a), made.solver.solve(b)
+        a, b = np.random.default_rng(1).standard_normal((2, len(kept)))
+        x, y = solve(a), solve(b)
         size = np.linalg.norm(a) * np.linalg.norm(y) + np.linalg.norm(b) * np.linalg.norm(x)
-        if abs(a @ y - b @ x) > SAME * size or min(a @ x, b @ y) <= 0:
+        both = np.linalg.norm(solve(a + b) - x - y) / np.linalg.norm(np.abs(x) + np.abs(y))
+        if abs(a @ y - b @ x) > SAME * size or both > SAME or min(a @ x, b @ y) <= 0:
             raise InputError(
                 f"body '{body.name}': its function does not solve K U = F with a symmetric positive"
                 " definite K; it must hold the fixed unknowns at 0 and be linear."
             )
         return
-    factors = getattr(made.solver, "factors", None)
-    if factors is None or not hasattr(factors, "U"):  # other solvers do not show them
-        return
-    pivots = factors.U.diagonal() / body.A.diagonal()[made.kept].max(initial=0.0)
-    if pivots.min(initial=1.0) < -PIVOT:
+    K = body.A[kept][:, kept]
+    low, high = _extremes(lambda x: np.asarray(K @ x), start)
+    softest = _extremes(solve, start)
+    if min(low, 0.0) < -PIVOT * high or softest[0] < -SAME * softest[1]:
         raise InputError(
-            f"body '{body.name}': K is not positive semidefinite, since {np.sum(pivots < 0)} of its"
-            " pivots are negative; Lagrange multipliers, mixed elements and buckling loads have no"
-            " place in it."
+            f"body '{body.name}': K is not positive semidefinite, since {low:.3g} is among its"
+            f" eigenvalues, or {softest[0]:.3g} among those of its inverse; Lagrange multipliers,"
+            " mixed elements and buckling loads have no place in it."
         )
-    if pivots.min(initial=1.0) < PIVOT:
-        raise without_stiffness(
-            body, f", since {np.sum(pivots < PIVOT)} of its pivots are rounding"
-        )
+    if not softest[1] * high * PIVOT < 1:
+        raise without_stiffness(body)
 
 
-def without_stiffness(body: Matrices, why: str) -> InputError:
+def _extremes(act: Act, x: np.ndarray) -> tuple[float, float]:
+    """The least and the largest Ritz value of a symmetric matrix after STEPS steps from x (n,)."""
+    basis = [x / np.linalg.norm(x)]
+    moved: list[np.ndarray] = []
+    while len(moved) < min(STEPS, len(x)):
+        moved.append(act(basis[-1]))
+        if not np.isfinite(moved[-1]).all():
+            return 0.0, np.inf
+        Q = np.stack(basis, axis=1)
+        rest = moved[-1] - Q @ (Q.T @ moved[-1])
+        rest -= Q @ (Q.T @ rest)
+        if np.linalg.norm(rest) <= SAME * np.linalg.norm(moved[-1]):
+            break
+        basis.append(rest / np.linalg.norm(rest))
+    H = np.stack(basis[: len(moved)]) @ np.stack(moved, axis=1)
+    values = np.linalg.eigvalsh((H + H.T) / 2)
+    return float(values[0]), float(values[-1])
+
+
+def without_stiffness(body: Matrices) -> InputError:
     """What to raise where more than the known free motions costs no force."""
     known = ", ".join(body.rigid_motions.names) or "none"
     return InputError(
         f"body '{body.name}': K has no stiffness against some motion beside its free motions"
-        f" ({known}){why}; name what holds it in fixed, give motions with K Z = 0, or leave out"
+        f" ({known}); name what holds it in fixed, give motions with K Z = 0, or leave out"
         " points that no element holds."
     )
