@@ -11,11 +11,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from difflib import get_close_matches
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactopt.errors import InputError
+
+if TYPE_CHECKING:
+    from skfem import Mesh
 
 RESERVED = {
     "con",
@@ -231,7 +234,7 @@ def overheard() -> Iterator[list[str]]:
 _TOLD: dict[int, tuple[str, ...]] = {}  # by the array of its nodes: copies of a mesh share it
 
 
-def remember(mesh: Any, told: Iterable[str]) -> Any:
+def remember(mesh: Mesh, told: Iterable[str]) -> Any:
     """The mesh, whose remarks, made when it was read, are those of every run with it."""
     if told := tuple(told):
         if id(mesh.doflocs) not in _TOLD:
@@ -240,6 +243,6 @@ def remember(mesh: Any, told: Iterable[str]) -> Any:
     return mesh
 
 
-def remembered(mesh: Any) -> tuple[str, ...]:
+def remembered(mesh: Mesh) -> tuple[str, ...]:
     """What was said of a mesh when it was read."""
     return _TOLD.get(id(getattr(mesh, "doflocs", None)), ())

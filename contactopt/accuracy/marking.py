@@ -19,6 +19,7 @@ from contactopt.meshes.given_curves import Curve
 from contactopt.meshes.mesh_refinement import Function, bent, divide, facets_of, slivers, split
 from contactopt.meshes.structured import simplices
 from contactopt.readings.peaks import Peak
+from contactopt.scenes.body_kinds import Body
 from contactopt.scenes.refined_scenes import part_curves
 from contactopt.scenes.scene import Part, Scene
 
@@ -53,7 +54,7 @@ class Shapes:
         """Whether a guess may be wrong."""
         return any(other is not None for own in self.guessed.values() for other in own.values())
 
-    def of(self, part: Any) -> Mapping[str, Curve]:
+    def of(self, part: Body) -> Mapping[str, Curve]:
         return self.curves.get(part.name, {})
 
 
@@ -65,8 +66,8 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
     curves: dict[str, dict[str, Curve]] = {}
     guessed: dict[str, dict[str, Function | None]] = {}
 
-    def prepared(part: Any) -> Any:
-        if not hasattr(part, "build_mesh"):
+    def prepared(part: Body) -> Body:
+        if not isinstance(part, Part):
             return part
         given = part.build_mesh(FIRST, scene.zone)
         cut = simplices(given) if simplicial else straight(given)
@@ -89,7 +90,7 @@ def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
 
 
-def left_out(part: Any, shapes: Shapes) -> np.ndarray:
+def left_out(part: Body, shapes: Shapes) -> np.ndarray:
     """The volumes (elements,) between the straight facets of a body and its curves; (0,) for a body
     without a mesh, and zeros where edges follow the curves.
     """
@@ -134,8 +135,8 @@ def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -
     return scene
 
 
-def _divided(part: Any, chosen: Mapping[str, np.ndarray], shapes: Shapes) -> Any:
-    if part.name not in chosen:
+def _divided(part: Body, chosen: Mapping[str, np.ndarray], shapes: Shapes) -> Body:
+    if not isinstance(part, Part) or part.name not in chosen:
         return part
     return replace(part, mesh=divide(part.mesh, chosen[part.name], shapes.of(part)))
 

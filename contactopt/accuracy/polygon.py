@@ -16,10 +16,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
+from skfem import Mesh
 
 # begin, end (2, f) and sagitta in doubt (f,) [length]
 Chords = tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -27,7 +27,7 @@ SAME = 1e-3  # relative difference of curvatures that rounding of files makes
 NEAREST = 8  # edges among which that of a point is looked for
 
 
-def other_polygon(mesh: Any, facets: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
+def other_polygon(mesh: Mesh, facets: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
     """The other shape of a boundary of a plane mesh, a function of points on the smooth line; None
     where no edge is in doubt.
     """
@@ -35,7 +35,7 @@ def other_polygon(mesh: Any, facets: np.ndarray) -> Callable[[np.ndarray], np.nd
     return partial(flatter, chords=chords) if np.any(chords[2] > 0) else None
 
 
-def chords_of(mesh: Any, facets: np.ndarray) -> Chords:
+def chords_of(mesh: Mesh, facets: np.ndarray) -> Chords:
     """Begin and end of every straight edge of the facets of a boundary of a plane mesh, and by how
     far the middle of each is in doubt.
     """

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import skfem
+from skfem import Mesh
 from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
@@ -168,7 +168,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             raise InputError(f"body '{part.name}': {wrong}; it has {', '.join(filled) or 'none'}.")
 
 
-def _words(mesh: Any) -> str:
+def _words(mesh: Mesh) -> str:
     """What a mesh that does not fit is."""
     if not isinstance(mesh, skfem.Mesh):
         return type(mesh).__name__

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from skfem import Mesh
 
 PLACES = {2: ((0, 0), (1, 1), (2, 2), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
 
@@ -25,7 +26,7 @@ class Fields:
     """
 
     name: str
-    mesh: Any
+    mesh: Mesh
     names: tuple[str, ...]
     displacement: np.ndarray
     stress: np.ndarray

@@ -30,11 +30,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations_with_replacement
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 import skfem
+from skfem import Mesh
 from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.assembly import Assembly
@@ -188,7 +188,7 @@ def _both_sides(
     return offset, row, column
 
 
-def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
+def _places(name: str, mesh: Mesh, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
     """Places (dim, m), the vertices there or -1 (m,), and the vertices (m, vertices) whose elements
     make each patch.
     """
@@ -229,7 +229,7 @@ def _places(name: str, mesh: Any, region: Region) -> tuple[np.ndarray, np.ndarra
     return places, vertices, seeds
 
 
-def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
+def _holder(mesh: Mesh, point: np.ndarray) -> tuple[np.ndarray, float]:
     """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
     size it misses it.
     """
@@ -245,7 +245,7 @@ def _holder(mesh: Any, point: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _patches(
-    mesh: Any, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float
+    mesh: Mesh, seeds: sp.csr_matrix, sources: np.ndarray, mirrored: np.ndarray, least: float
 ) -> tuple[sp.csr_matrix, np.ndarray]:
     """Mask (m, elements) of the elements that make each patch, and which patches (m,) are wide.
     With their mirror images beyond the planes of symmetry of `mirrored` (dim, nodes) they are at

@@ -4,12 +4,15 @@ the quadrilaterals that the triangles are halves of.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from skfem import MeshTri
+from skfem import Mesh, MeshTri
 
 from contactopt.material import Material, lame
+
+if TYPE_CHECKING:
+    from contactopt.bounds.equilibrium_elements import EquilibriumElements
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # of a quadrilateral
 STEPS = 8  # of Newton's method for a place in a quadrilateral, at most
@@ -24,11 +27,11 @@ class Halves(NamedTuple):
              triangles are elements themselves
     """
 
-    mesh: Any
+    mesh: Mesh
     corners: np.ndarray | None = None
 
 
-def halved(mesh: Any) -> Halves:
+def halved(mesh: Mesh) -> Halves:
     """Cut a mesh of quadrilaterals."""
     t = np.concatenate([mesh.t[[0, 1, 3]], mesh.t[[1, 2, 3]]], axis=1)
     made = MeshTri(mesh.p, t)
@@ -43,7 +46,11 @@ def halved(mesh: Any) -> Halves:
 
 
 def displaced_stress(
-    cells: Any, material: Material, nodal: np.ndarray, at: np.ndarray, r: np.ndarray | None
+    cells: EquilibriumElements,
+    material: Material,
+    nodal: np.ndarray,
+    at: np.ndarray,
+    r: np.ndarray | None,
 ) -> np.ndarray:
     """Components xx, yy, xy and the one across (e, s, 4) of the stress under displacements (2,
     vertices and edges), at shares (3, s) of the vertices; `r` (e, s) radii, if revolved.

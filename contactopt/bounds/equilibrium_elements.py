@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -133,7 +133,7 @@ class EquilibriumElements(Simplices):
         force: np.ndarray,
         held: np.ndarray,
         moments: np.ndarray,
-        answer: Any = None,
+        answer: object = None,
     ) -> tuple[np.ndarray, float]:
         """The stress (e, s, 4) of this module's head that is nearest to `stress`, and the largest
         force out of balance over the largest one. Arguments as of Tetrahedra.equilibrated(), but

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
+from skfem import Mesh
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefTri
 
@@ -278,7 +279,7 @@ def measures(points: np.ndarray) -> np.ndarray:
 
 
 def _side(
-    mesh: Any, body: tuple[int, float], facets: np.ndarray, places: np.ndarray, frame: np.ndarray
+    mesh: Mesh, body: tuple[int, float], facets: np.ndarray, places: np.ndarray, frame: np.ndarray
 ) -> _Side:
     """The facets of a body, whose vertices find their contacts along the normal."""
     vertices, plane = mesh.facets[:, facets], frame[1:]
@@ -287,7 +288,7 @@ def _side(
     return _Side(*body, facets, vertices, _nodes(mesh, vertices), contacts.reshape(vertices.shape))
 
 
-def _nodes(mesh: Any, vertices: np.ndarray) -> np.ndarray:
+def _nodes(mesh: Mesh, vertices: np.ndarray) -> np.ndarray:
     """The nodes (q, f) of a quadratic displacement on facets with these vertices (dim, f)."""
     edges = np.sort(mesh.facets if len(mesh.p) == 2 else mesh.edges, axis=0)
     keys = edges[0] * mesh.nvertices + edges[1]
@@ -299,7 +300,7 @@ def _nodes(mesh: Any, vertices: np.ndarray) -> np.ndarray:
     return np.concatenate(found)
 
 
-def _aligned(lead: _Side, other: _Side, mesh: Any) -> _Side:
+def _aligned(lead: _Side, other: _Side, mesh: Mesh) -> _Side:
     """The facets of the other side in the order of the first one, and their vertices as well."""
     wanted, there = (np.sort(side.contacts, axis=0).T.tolist() for side in (lead, other))
     place = {tuple(own): i for i, own in enumerate(there)}

@@ -42,7 +42,7 @@ friction. Coulomb's law needs small friction, as in contactopt.bounds.bound.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -54,6 +54,9 @@ from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
 from contactopt.readings.quantities import Quantity
 from contactopt.readings.state import State
+
+if TYPE_CHECKING:
+    from contactopt.bounds.bound import Bound
 
 ALL = 1e-9  # by how much shares that add up to one may miss it, and slack that is none
 TINY, HUGE = 1e-200, 1e200
@@ -73,7 +76,7 @@ class _Adjoint(NamedTuple):
     work: float
 
 
-def interval(bound: Any, quantity: Quantity) -> tuple[float, float]:
+def interval(bound: Bound, quantity: Quantity) -> tuple[float, float]:
     """The middle and half the width of an interval in which the exact value of a quantity lies,
     which is one of LINEAR or the energy. InputError, one sentence, where there is no interval.
     """
@@ -144,7 +147,7 @@ def _least_constant(scene: PressedScene, t: np.ndarray) -> float:
     return found
 
 
-def _adjoint(bound: Any, omega: np.ndarray, duals: Duals, limit: float) -> _Adjoint:
+def _adjoint(bound: Bound, omega: np.ndarray, duals: Duals, limit: float) -> _Adjoint:
     """The adjoint, cut off where c would be more than `limit`."""
     scene = bound.scene
     t, most = scene.share[:, None] * duals.dual.q, limit * _slack(scene)[:, None]
@@ -164,7 +167,7 @@ def _adjoint(bound: Any, omega: np.ndarray, duals: Duals, limit: float) -> _Adjo
 
 
 def _with_slip(
-    bound: Any, pair: FacingFacets, z: list[np.ndarray], omega: np.ndarray, limit: float
+    bound: Bound, pair: FacingFacets, z: list[np.ndarray], omega: np.ndarray, limit: float
 ) -> tuple[np.ndarray, float]:
     """Make y_t vanish where the surfaces of a pair stick, and stay below `limit` times the slip.
     Returns the direction e (f, 1) of each facet, zero where y_t is zero, and c.
@@ -214,7 +217,7 @@ def _shear_by_pressure(
 
 
 def _with_gap(
-    bound: Any,
+    bound: Bound,
     pair: FacingFacets,
     z: list[np.ndarray],
     omega: np.ndarray,

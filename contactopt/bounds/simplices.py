@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,7 +17,7 @@ class Simplices:
     them.
     """
 
-    mesh: Any
+    mesh: Mesh
 
     @cached_property
     def dim(self) -> int:

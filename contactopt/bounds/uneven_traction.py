@@ -38,23 +38,26 @@ In bodies of revolution r s takes the place of s.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import skfem
 
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
-from contactopt.bounds.facing_facets import measures
+from contactopt.bounds.facing_facets import FacingFacets, measures
 from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.errors import InputError
 from contactopt.material import Material
+
+if TYPE_CHECKING:
+    from contactopt.bounds.pressed_scene import PressedScene
 
 CONSTANT = 1.73  # c of tetrahedra, from 8 parts of an edge
 SAME = 1e-9  # bends nearer to each other than this share of a facet are one
 UNBALANCED = 1e-6  # of the force on a piece
 
 
-def uneven_traction(scene: Any) -> list[np.ndarray]:
+def uneven_traction(scene: PressedScene) -> list[np.ndarray]:
     """For every body (e,) an upper bound of the energy norm of what is missing in its elements."""
     out = [np.zeros(0 if own is None else len(own.volume)) for own in scene.cells]
     for pair in (own for own in scene.pairs if own.joined):
@@ -65,7 +68,7 @@ def uneven_traction(scene: Any) -> list[np.ndarray]:
     return out
 
 
-def _by_constant(scene: Any, pair: Any) -> np.ndarray:
+def _by_constant(scene: PressedScene, pair: FacingFacets) -> np.ndarray:
     """An upper bound of the least energy behind each facet (f,)."""
     side = pair.sides[1]
     cells, material = scene.cells[side.body], scene.bodies[side.body].body.material
@@ -74,7 +77,7 @@ def _by_constant(scene: Any, pair: Any) -> np.ndarray:
     return least_energy(cells, material, elements, size, uneven_squares(scene, pair))
 
 
-def uneven_squares(scene: Any, pair: Any) -> np.ndarray:
+def uneven_squares(scene: PressedScene, pair: FacingFacets) -> np.ndarray:
     """(f, dim, dim) integrals of d d' over the facets of the second side, d by their area."""
     points, d, size = pair.rule, scene.problem.dim, measures(pair.points[1])
     facets = points.facets[1]
@@ -117,7 +120,7 @@ def regular_tetrahedron() -> Tetrahedra:
     return Tetrahedra(skfem.MeshTet(points, np.arange(4)[:, None]))
 
 
-def _by_fans(scene: Any, pair: Any) -> np.ndarray:
+def _by_fans(scene: PressedScene, pair: FacingFacets) -> np.ndarray:
     """The least energy behind each facet (f,)."""
     side = pair.sides[1]
     cells, material = scene.cells[side.body], scene.bodies[side.body].body.material
@@ -183,7 +186,7 @@ def _fans(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray) -> tuple[Any, 
     return mesh, m
 
 
-def _least_energies(cells: EquilibriumElements, m: np.ndarray, material: Any) -> np.ndarray:
+def _least_energies(cells: EquilibriumElements, m: np.ndarray, material: Material) -> np.ndarray:
     """The energies (e,) of stresses with these moments of tractions, least in sum."""
     held = np.zeros(m.shape[:2], dtype=bool)
     none = np.zeros_like(cells.stress(material, np.zeros((2, len(m) + cells.mesh.nvertices))))

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from contactopt.checks import check_number, real_array
 from contactopt.derivatives.kinks import Onesided, Weak, of_kinks, weak_contacts
@@ -280,7 +281,7 @@ def told_apart(residual: float) -> float:
     return max(NEAR, ROUNDING * residual)
 
 
-def _given(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _given(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
     """The array of that shape; zeros if there is none, and one number fills it."""
     if value is None:
         return np.zeros(shape)

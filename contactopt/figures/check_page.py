@@ -12,6 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.elements import FACES, Faces
@@ -199,7 +200,7 @@ def _spread(places: np.ndarray, many: int) -> np.ndarray:
 
 
 def _boundaries(
-    scene: Scene, part: Part, mesh: Any, planes: set[tuple[int, float]]
+    scene: Scene, part: Part, mesh: Mesh, planes: set[tuple[int, float]]
 ) -> Iterator[dict[str, Any]]:
     """The named boundaries of a body, what its loads are, and along which axes supports hold it. A
     boundary in a plane of symmetry, across which the body is shown whole, is hidden.
@@ -245,7 +246,7 @@ def _boundaries(
             }
 
 
-def _normals(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _normals(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Places of the nodes of facets, and outward normals there (dim, m), zero within edges."""
     corners = mesh.facets[:, facets]
     places = FACES[mesh.refdom.__name__][2][:, : len(corners)]
@@ -257,7 +258,7 @@ def _normals(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return mesh.doflocs[:, nodes], sums[:, nodes] / np.where(length > 0, length, 1.0)
 
 
-def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+def _sides(mesh: Mesh) -> Iterator[tuple[str, dict[str, Any]]]:
     """The nodes of each named boundary, in space the triangles between them, and no arrows."""
     kind, faces = surface(*elements_of(mesh), _spatial(mesh.doflocs))
     for name, side in (mesh.boundaries or {}).items():
@@ -272,7 +273,7 @@ def _sides(mesh: Any) -> Iterator[tuple[str, dict[str, Any]]]:
         yield name, {"places": places, "cells": cells, "vector": vector, "marked": marked}
 
 
-def _faces_on(mesh: Any, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
+def _faces_on(mesh: Mesh, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
     """The faces of the surface of a solid (m, v) that are among some facets of its mesh."""
     shown, corners = np.sort(faces[:, : CORNERS[kind]], axis=1), mesh.facets[:, facets]
     wanted = np.sort(corners.T, axis=1)

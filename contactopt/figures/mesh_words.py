@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.bodies.elements import Faces
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
@@ -44,13 +45,13 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
     return "\n".join([*lines, *(["", as_toml(pairs, 0.3, "mm")] if pairs else [])]), named
 
 
-def _place(mesh: Any, x: np.ndarray) -> str:
+def _place(mesh: Mesh, x: np.ndarray) -> str:
     """Coordinates in brackets."""
     shown = np.where(np.abs(x) < ZERO * np.abs(mesh.p).max(), 0.0, x)
     return "(" + ", ".join(f"{value:.5g}" for value in shown) + ")"
 
 
-def _measure(mesh: Any, facets: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+def _measure(mesh: Mesh, facets: np.ndarray | None = None) -> tuple[float, np.ndarray]:
     """Volume of a mesh, or area of facets, and the middle of it; edges are curved as they are."""
     from skfem.quadrature import get_quadrature
 
@@ -64,7 +65,7 @@ def _measure(mesh: Any, facets: np.ndarray | None = None) -> tuple[float, np.nda
     return float(dx.sum()), np.sum(x * dx, axis=(1, 2)) / dx.sum()
 
 
-def _shape(mesh: Any, facets: np.ndarray) -> str:
+def _shape(mesh: Mesh, facets: np.ndarray) -> str:
     """The outward normal of a flat boundary; the radius of a circle, a cylinder or a sphere, whose
     points are x = c + R n with the normal n across its axis.
     """

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
+from skfem import Mesh
 
 from contactopt.cards import force_unit
 from contactopt.figures.closing import closing, gap_vectors
@@ -178,7 +179,7 @@ def _at_all_states(folder: Path, name: str, states: int, dim: int) -> dict[str, 
 
 
 def body_arrays(
-    mesh: Any, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool
+    mesh: Mesh, values: dict[str, np.ndarray], mirrors: list[list[Any]], inside: bool
 ) -> dict[str, Any]:
     """What is drawn of a body: its surface, in 2D all of it, and with `inside` its elements; values
     at their nodes. What lies in a plane of symmetry is apart.
@@ -241,7 +242,7 @@ def _motion(
 
 
 def _contact(
-    mesh: Any,
+    mesh: Mesh,
     motion: tuple[np.ndarray, np.ndarray],
     interface: dict[str, np.ndarray],
     path: dict[str, np.ndarray] | None,
@@ -281,7 +282,7 @@ def _rounded(lengths: np.ndarray, extent: float) -> np.ndarray:
     return np.where(np.abs(np.nan_to_num(lengths)) > ROUNDING * extent, lengths, 0.0)
 
 
-def _last_state(mesh: Any, interface: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:
+def _last_state(mesh: Mesh, interface: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:
     """Values (k,) of the contacts of one pair; `vector` (k, 3) is the whole traction in space."""
     data, traction = mesh.point_data, interface["traction"][own]
     traction = traction.reshape(len(traction), -1)

@@ -26,6 +26,7 @@ from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.unbalanced_loads import escape, resisted, sentence
 from contactopt.readings.plausibility import doubts, said_of_meshes
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
 
@@ -180,7 +181,7 @@ def _direction(n: np.ndarray) -> str:
     return f"({', '.join(f'{value:.3g}' for value in np.round(n, 6) + 0.0)})"
 
 
-def _pair_lines(scene: Scene, pair: Any, own: Coupling) -> list[str]:
+def _pair_lines(scene: Scene, pair: Contact, own: Coupling) -> list[str]:
     """How the surfaces of a pair lie to each other before they are loaded."""
     length, size = scene.units[0], float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
     total = float(own.areas.sum())

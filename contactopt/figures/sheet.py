@@ -9,6 +9,7 @@ from inspect import Parameter, getdoc, signature
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.cards import count
 from contactopt.figures.pieces import pieces, surface, triangles
@@ -95,7 +96,7 @@ def _section(scene: Scene) -> str:
     return "" if scene.copies == 1 else "  (the part that is modelled)"
 
 
-def part_lines(scene: Scene, part: Any, mesh: Any) -> list[str]:
+def part_lines(scene: Scene, part: Any, mesh: Mesh) -> list[str]:
     length, stress = scene.units
     lines = [f"body '{part.name}'"]
     material = getattr(part, "material", None)

@@ -19,23 +19,23 @@ class Stacked:
     parts: tuple[Any, ...]
     __array_ufunc__ = None  # NumPy's numbers leave the operators to this class
 
-    def _each(self, act: Act, other: Any) -> Stacked:
+    def _each(self, act: Act, other: object) -> Stacked:
         others = other.parts if isinstance(other, Stacked) else (other,) * len(self.parts)
         return Stacked(tuple(map(act, self.parts, others)))
 
-    def __add__(self, other: Any) -> Stacked:
+    def __add__(self, other: Vector | float) -> Stacked:
         return self._each(operator.add, other)
 
-    def __sub__(self, other: Any) -> Stacked:
+    def __sub__(self, other: Vector | float) -> Stacked:
         return self._each(operator.sub, other)
 
-    def __mul__(self, other: Any) -> Stacked:
+    def __mul__(self, other: Vector | float) -> Stacked:
         return self._each(operator.mul, other)
 
     def __rmul__(self, factor: float) -> Stacked:
         return self._each(operator.mul, factor)
 
-    def __truediv__(self, other: Any) -> Stacked:
+    def __truediv__(self, other: Vector | float) -> Stacked:
         return self._each(operator.truediv, other)
 
     def __pow__(self, power: float) -> Stacked:
@@ -44,7 +44,7 @@ class Stacked:
     def __neg__(self) -> Stacked:
         return self._each(operator.mul, -1.0)
 
-    def astype(self, kind: Any) -> Stacked:
+    def astype(self, kind: type) -> Stacked:
         """The vector in another precision."""
         return self._each(lambda part, kind: part.astype(kind), kind)
 

@@ -22,10 +22,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
+from skfem import Mesh
 
 from contactopt.meshes.cells import is_curved
 from contactopt.meshes.given_curves import Curve
@@ -44,7 +44,7 @@ DIGITS = range(6, 13)  # decimal digits that files write
 STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and its curve
 
 
-def plane_curves(mesh: Any) -> dict[str, Curve | None]:
+def plane_curves(mesh: Mesh) -> dict[str, Curve | None]:
     """By the name of each boundary of a plane mesh, '' for others: its curve, None if straight."""
     facets = mesh.boundary_facets()
     edges, points, owner, known = _edges(mesh, facets)
@@ -61,7 +61,7 @@ def plane_curves(mesh: Any) -> dict[str, Curve | None]:
     return found
 
 
-def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
+def shares(mesh: Mesh, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]]:
     """The name of each boundary of a mesh, or '' for what has none; what messages call its curve;
     and whether each piece of the surface, on the facets `owner` (t,), is its own.
     """
@@ -73,7 +73,7 @@ def shares(mesh: Any, owner: np.ndarray) -> Iterator[tuple[str, str, np.ndarray]
     yield "", "the curve of the boundary without a name", left
 
 
-def _edges(mesh: Any, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+def _edges(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
     """Edges (2, e) of the outline, places of nodes, facets of edges, whether any edge is curved."""
     ends = mesh.facets[:, facets]
     if not is_curved(mesh):

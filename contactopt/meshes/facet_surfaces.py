@@ -25,6 +25,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
+from skfem import Mesh
 
 from contactopt.meshes.cells import area_vectors, is_curved, joined, outer_corners
 from contactopt.meshes.curves import CORNER, STRAIGHT, fitted_sphere, rounding, shares
@@ -44,7 +45,7 @@ PREFER = 1e-6  # by how much less a curved triangle may be near than a flat one
 Shape = Callable[[np.ndarray], np.ndarray]
 
 
-def space_curves(mesh: Any) -> dict[str, Curve | None]:
+def space_curves(mesh: Mesh) -> dict[str, Curve | None]:
     """By the name of each boundary of a solid's mesh, '' for others, its surface, None if flat."""
     skin, found = _Skin(mesh), dict[str, Any]()
     for name, label, mine in shares(mesh, skin.owner):
@@ -70,7 +71,7 @@ class _Skin:
     near     how far nodes may be off by rounding [length]
     """
 
-    def __init__(self, mesh: Any) -> None:
+    def __init__(self, mesh: Mesh) -> None:
         self.nodes, self.owner, middles = _triangles(mesh)
         self.corners = mesh.p[:, self.nodes]
         self.middles = middles
@@ -165,7 +166,7 @@ def _along(corners: np.ndarray) -> np.ndarray:
     return np.asarray(np.roll(corners, -1, axis=1) - corners)
 
 
-def _triangles(mesh: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _triangles(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Corners (3, t) of the triangles, their facets (t,), and middles (3, 3, t) of their edges."""
     facets = mesh.boundary_facets()
     nodes = outer_corners(mesh, facets)

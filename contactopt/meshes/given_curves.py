@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.checks import place_words
 from contactopt.errors import InputError
@@ -54,7 +55,7 @@ class Curve:
         return found
 
 
-def check_curve(curve: Curve, mesh: Any, boundary: str) -> None:
+def check_curve(curve: Curve, mesh: Mesh, boundary: str) -> None:
     """Raise InputError unless the nodes of a boundary lie on its curve: where those of many facets
     are further from it than OFF of the facet, or those of one than FAR.
     """

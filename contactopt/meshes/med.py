@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.meshes.cells import mirrored
 from contactopt.meshes.mesh_repair import in_order
@@ -41,7 +42,7 @@ def _one(group: Any, what: str) -> list[str]:
     return list(group)
 
 
-def _mesh(mesh: Any, dim: int, families: Any) -> Any:
+def _mesh(mesh: Mesh, dim: int, families: Any) -> Any:
     import meshio
     from meshio.med._med import med_to_meshio_type
 

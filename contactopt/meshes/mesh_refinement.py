@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import skfem
 from scipy.spatial import cKDTree
+from skfem import Mesh
 
 from contactopt.checks import place_words
 from contactopt.errors import InputError
@@ -50,14 +51,14 @@ class TooSmall(InputError):
     """All marked elements are so small that their halves would have no volume for rounding."""
 
 
-def boundary_curves(mesh: Any) -> dict[str, Curve | None]:
+def boundary_curves(mesh: Mesh) -> dict[str, Curve | None]:
     """Find the line or surface that each boundary of a mesh stands for, by its name, '' for what
     has none; None where it is flat.
     """
     return plane_curves(mesh) if len(mesh.p) == 2 else space_curves(mesh)
 
 
-def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
+def divide(mesh: Mesh, marked: np.ndarray, curves: Curves) -> Any:
     """Divide the marked elements (by number) of a mesh of straight triangles or tetrahedra, and
     others as far as it takes to stay conforming; named boundaries stay.
 
@@ -79,7 +80,7 @@ def divide(mesh: Any, marked: np.ndarray, curves: Curves) -> Any:
     return _refined(mesh, marked[large], curves)
 
 
-def split(mesh: Any, curves: Curves) -> Any:
+def split(mesh: Mesh, curves: Curves) -> Any:
     """Halve all elements of a mesh, with new nodes of curved boundaries on their curves, as for
     `divide`.
 
@@ -90,7 +91,7 @@ def split(mesh: Any, curves: Curves) -> Any:
     return bent(fine, curves) if is_curved(mesh) else fine
 
 
-def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
+def _refined(mesh: Mesh, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
     """The mesh divided as scikit-fem is told, its new nodes at `places`, if any, and on curves."""
     fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
@@ -102,7 +103,7 @@ def _refined(mesh: Any, how: Any, curves: Curves, places: np.ndarray | None = No
     return _unfolded(fine, points)
 
 
-def facets_of(mesh: Any, name: str) -> np.ndarray:
+def facets_of(mesh: Mesh, name: str) -> np.ndarray:
     """Number the facets (f,) of a boundary; the name '' stands for what has no name."""
     if name:
         return np.asarray(mesh.boundaries[name])
@@ -110,7 +111,7 @@ def facets_of(mesh: Any, name: str) -> np.ndarray:
     return np.setdiff1d(mesh.boundary_facets(), named)
 
 
-def _present(mesh: Any, curves: Curves) -> dict[str, Function]:
+def _present(mesh: Mesh, curves: Curves) -> dict[str, Function]:
     """The curves of boundaries that have facets."""
     return {
         name: curve
@@ -119,7 +120,7 @@ def _present(mesh: Any, curves: Curves) -> dict[str, Function]:
     }
 
 
-def _unfolded(mesh: Any, points: np.ndarray) -> Any:
+def _unfolded(mesh: Mesh, points: np.ndarray) -> Any:
     """The mesh with its nodes at `points`, but for those that would turn an element inside out."""
     nodes, before = np.asarray(mesh.dofs.element_dofs if is_curved(mesh) else mesh.t), volumes(mesh)
     sense, least = np.sign(before[:, -1:]), FLAT * np.abs(before).min(axis=1)
@@ -136,7 +137,7 @@ def _unfolded(mesh: Any, points: np.ndarray) -> Any:
     return replace(mesh, doflocs=points)
 
 
-def bent(mesh: Any, curves: Curves) -> Any:
+def bent(mesh: Mesh, curves: Curves) -> Any:
     """Bend the edges and faces of a mesh of straight elements along its curved boundaries: a mesh
     of second order, or the same mesh where there is no curve.
 
@@ -170,7 +171,7 @@ def bent(mesh: Any, curves: Curves) -> Any:
     return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
 
 
-def slivers(mesh: Any, curves: Curves) -> np.ndarray:
+def slivers(mesh: Mesh, curves: Curves) -> np.ndarray:
     """The volumes (elements,) between the straight facets of simplices and the curves that these
     stand for [length^dim], negative where the body lies beyond its curve.
 

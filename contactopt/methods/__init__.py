@@ -74,7 +74,7 @@ METHODS = {
 }
 
 
-def solves(method: Any, law: Law) -> bool:
+def solves(method: Method, law: Law) -> bool:
     """Whether a method solves problems of a law, in the variables in which methods see the law
     (`Law.plain`). One that says nothing about it solves all.
     """

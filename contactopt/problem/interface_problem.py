@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import ArrayLike
 
 from contactopt.cards import card, count, line
 from contactopt.checks import given, real_array
@@ -86,17 +87,17 @@ class InterfaceProblem:
     def __init__(
         self,
         Q: Any,
-        q: Any,
+        q: ArrayLike,
         law: Any = None,
-        V: Any = (),
-        s: Any = (),
-        areas: Any = (),
-        coordinates: Any = (),
+        V: ArrayLike = (),
+        s: ArrayLike = (),
+        areas: ArrayLike = (),
+        coordinates: ArrayLike = (),
         chart: Chart | None = None,
         pairs: tuple[Pair, ...] = (),
         motions: tuple[str, ...] = (),
         *,
-        mu: Any = None,
+        mu: ArrayLike | None = None,
     ):
         if (law is None) == (mu is None):
             raise InputError("give either a law or a friction coefficient mu.")
@@ -139,9 +140,9 @@ class InterfaceProblem:
             "pairs": _consecutive(pairs, k, chart),
             "motions": motions,
         }
-        if motions and len(motions) != s.size:
+        if motions and len(motions) != len(arrays["s"]):
             raise InputError(
-                f"motions must name the {s.size} columns of V; got {len(motions)} names."
+                f"motions must name the {len(arrays['s'])} columns of V; got {len(motions)} names."
             )
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -245,7 +246,7 @@ class InterfaceProblem:
         return (self.Q @ reactions.ravel() + self.V @ multipliers).reshape(self.q.shape) + self.q
 
 
-def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> np.ndarray:
+def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
     """The value as a real finite array of its own, of that shape."""
     array = real_array(name, value)
     if array.shape != shape:

@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
+from skfem import Mesh
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefTri
 
@@ -136,7 +137,7 @@ def _rigid_heights(coupling: Coupling, ways: list[Way | None], gaps: list[Any]) 
 class Way:
     """The way from the facets of a boundary to the curve that they stand for."""
 
-    def __init__(self, mesh: Any, name: str, curve: Callable[[np.ndarray], np.ndarray]) -> None:
+    def __init__(self, mesh: Mesh, name: str, curve: Callable[[np.ndarray], np.ndarray]) -> None:
         nodes = outer_corners(mesh, np.asarray(mesh.boundaries[name]))
         edges = mesh.p[:, np.stack([nodes, np.roll(nodes, 1, axis=0)])]  # (dim, 2, c, f)
         middles = edges.mean(axis=1).reshape(len(mesh.p), -1)

@@ -16,6 +16,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.bodies.fields import Region
 from contactopt.bodies.views import stress_map
@@ -102,7 +103,7 @@ def _share(part: Any, scene: Any, place: np.ndarray, reach: float) -> float:
     return filled(cells, vertex) if away[vertex] <= reach else 0.5
 
 
-def re_entrant(mesh: Any, vertex: int) -> bool:
+def re_entrant(mesh: Mesh, vertex: int) -> bool:
     """Whether a vertex, or one within two elements of it, is at a re-entrant corner or edge. (The
     recovered stress at the corner itself may be less than that next to it.)
     """

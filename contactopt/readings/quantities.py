@@ -241,7 +241,7 @@ def _motion(state: State, component: int) -> Seeds:
         )
     by_r, by_motions, by_U = np.zeros(state.problem.q.shape), [], []
     for body, B, weights in zip(reduction.bodies, reduction.maps, sign * found.weights):
-        own: Any = np.zeros(len(body.motions.resultants))
+        own = np.zeros(len(body.motions.resultants))
         total: Any = None
         for c in np.flatnonzero(weights):
             w, moved = (weights[c] * each for each in body.carried(int(c)))

@@ -26,10 +26,10 @@ class Seeds:
     """
 
     value: float
-    reactions: Any = None
-    multipliers: Any = None
-    displacements: Any = None
-    slip: Any = None
+    reactions: np.ndarray | None = None
+    multipliers: np.ndarray | None = None
+    displacements: np.ndarray | None = None
+    slip: np.ndarray | None = None
     bodies: tuple[Any, ...] = ()
     explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
 
@@ -81,7 +81,7 @@ class Functional:
     weights  (k, dim), one per component of the reactions
     """
 
-    weights: Any
+    weights: np.ndarray
 
     def __call__(self, state: State) -> Seeds:
         weights, shape = np.asarray(self.weights, dtype=float), state.problem.q.shape

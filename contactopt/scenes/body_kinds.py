@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.checks import check_name, check_number, real_array, short
 from contactopt.errors import InputError
@@ -66,7 +67,7 @@ class Part:
     """
 
     name: str
-    mesh: Any
+    mesh: Mesh
     material: Material
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()

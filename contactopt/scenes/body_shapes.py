@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.files.toml_table import Table
 
@@ -149,7 +150,7 @@ def _disc(table: Table, components: tuple[str, ...]) -> Any:
     return disc(radius, around // 8)
 
 
-def _named(mesh: Any, places: Table, components: tuple[str, ...]) -> Any:
+def _named(mesh: Mesh, places: Table, components: tuple[str, ...]) -> Any:
     """The mesh with the boundaries that are named by where they are."""
     from contactopt.meshes.mesh_files import name_boundaries
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
+from skfem import Mesh
 
 from contactopt.meshes.cells import area_vectors, outer_corners
 
@@ -75,7 +76,7 @@ def as_toml(pairs: Iterable[Facing], mu: Any, length: str) -> str:
 class _Surface:
     """The facets of the boundaries of a mesh: corners (dim, c, f), centres, areas, normals."""
 
-    def __init__(self, mesh: Any):
+    def __init__(self, mesh: Mesh):
         facets = np.unique(np.concatenate([np.asarray(own) for own in mesh.boundaries.values()]))
         self.corners = mesh.p[:, outer_corners(mesh, facets)]
         self.centres = self.corners.mean(axis=1)

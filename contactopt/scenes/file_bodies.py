@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import make_mesh
@@ -190,17 +191,17 @@ def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
     )
 
 
-def _support(table: Table, mesh: Any, reading: Reading) -> Support:
+def _support(table: Table, mesh: Mesh, reading: Reading) -> Support:
     boundary, values = _boundary(table, "boundary", mesh), reading.numbers(table)
     table.close()
     return Support(boundary, values or None)
 
 
-def _boundary(table: Table, key: str, mesh: Any) -> str:
+def _boundary(table: Table, key: str, mesh: Mesh) -> str:
     return _named(table, key, table.take(key, str, needed=True), mesh, "the body")
 
 
-def _named(table: Table, key: str, name: str, mesh: Any, body: str) -> str:
+def _named(table: Table, key: str, name: str, mesh: Mesh, body: str) -> str:
     """The name of a boundary of a mesh."""
     known = mesh.boundaries or {}
     if name not in known:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.meshes.given_curves import Curve
 from contactopt.meshes.mesh_refinement import Function, boundary_curves, split
@@ -42,7 +43,7 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
     return scene.with_parts(finer) if splits else scene
 
 
-def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
+def part_curves(part: Part, mesh: Mesh) -> dict[str, Curve]:
     """Find the curves of all curved boundaries of a part and its mesh: by the name of a boundary,
     or '' for what has no name, the curve that the part gives, or that of the mesh.
     """
@@ -50,7 +51,7 @@ def part_curves(part: Part, mesh: Any) -> dict[str, Curve]:
     return {name: curve for name, curve in found.items() if curve is not None}
 
 
-def _kept_partners(curve: Function, mesh: Any, name: str) -> Function:
+def _kept_partners(curve: Function, mesh: Mesh, name: str) -> Function:
     """A curve along which points keep one coordinate, so that the nodes of two bodies match.
 
     Where the boundary turns away from this coordinate by more than 45 degrees the curve stays as it

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from skfem import Mesh
 
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
@@ -54,7 +55,7 @@ def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
 def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
     """The function that takes the elements above a plane, with a boundary of that name in it."""
 
-    def change(mesh: Any) -> Any:
+    def change(mesh: Mesh) -> Any:
         near = NEAR * float(np.ptp(mesh.p, axis=1).max())
         height = plane.height(mesh.p)[mesh.t]
         if np.any((height.min(axis=0) < -near) & (height.max(axis=0) > near)):
@@ -71,7 +72,7 @@ def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
     return change
 
 
-def _restricted(mesh: Any, elements: np.ndarray) -> Any:
+def _restricted(mesh: Mesh, elements: np.ndarray) -> Any:
     """The mesh of some elements; those of second order keep their curved sides."""
     own = straight(mesh).restrict(elements)
     if not is_curved(mesh):

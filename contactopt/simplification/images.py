@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
+from skfem import Mesh
 
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part
@@ -114,7 +115,7 @@ def _images_of_meshes(whole: Whole, plane: Plane) -> dict[str, tuple[str, np.nda
     return found if all(found[image][0] == name for name, (image, _) in found.items()) else None
 
 
-def _nodes(mesh: Any, image: Any, plane: Plane, near: float) -> np.ndarray | None:
+def _nodes(mesh: Mesh, image: Any, plane: Plane, near: float) -> np.ndarray | None:
     """The node of a mesh on which the image of each node lies; None unless all have images."""
     here, there = plane.image(mesh.doflocs), image.doflocs
     if here.shape != there.shape or mesh.t.shape != image.t.shape:

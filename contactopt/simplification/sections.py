@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import skfem
 from scipy.spatial import KDTree
+from skfem import Mesh
 
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import NEAR, ROUNDED
@@ -42,12 +43,12 @@ class _Prism:
         """(3, k) points of the section (2, k) on the lower end."""
         return np.insert(x, self.axis, self.ends[0], axis=0)
 
-    def on_end(self, mesh: Any, place: float) -> np.ndarray:
+    def on_end(self, mesh: Mesh, place: float) -> np.ndarray:
         """Numbers of the facets of a mesh on an end."""
         at = mesh.p[self.axis][mesh.facets]
         return np.flatnonzero(np.abs(at - place).max(axis=0) < NEAR * self.whole.size)
 
-    def flat(self, mesh: Any) -> Any:
+    def flat(self, mesh: Mesh) -> Any:
         """The section of a mesh; its edges bear the names of the boundaries that stand on them."""
         corners = mesh.facets[:, self.on_end(mesh, self.ends[0])]
         nodes, cells = np.unique(corners, return_inverse=True)

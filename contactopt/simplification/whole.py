@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import skfem
+from skfem import Mesh
 
 from contactopt.bodies.body import check_mesh
 from contactopt.meshes.cells import SHAPES
@@ -132,7 +133,7 @@ def with_pairs(
     return replace(scene, **others)
 
 
-def of_mesh(mesh: Any, change: Callable[[Any], Any]) -> Any:
+def of_mesh(mesh: Mesh, change: Callable[[Any], Any]) -> Any:
     """A changed mesh, or the function that makes it where the mesh is a function."""
     if callable(mesh):
         return lambda elements, zone: change(mesh(elements, zone))
