@@ -90,7 +90,7 @@ def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
 
 
-def left_out(part: Body, shapes: Shapes) -> np.ndarray:
+def left_out(part: Any, shapes: Shapes) -> np.ndarray:
     """The volumes (elements,) between the straight facets of a body and its curves; (0,) for a body
     without a mesh, and zeros where edges follow the curves.
     """
