@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 from conftest import one_contact
+from scipy.optimize import linprog
 
 from contactopt import InputError, InterfaceProblem, natural_map_residual, reduce, scenes, solve
 from contactopt.methods.complementarity import Lemke, complementarity_problem, lemke
@@ -359,3 +360,60 @@ def test_the_tree_never_contradicts_a_solution_that_exists(dim):
         assert any(tree.points()), seed
         solution = solve(solvable)
         assert solution.status is not Status.INFEASIBLE, seed
+
+
+def feasible_states(problem: InterfaceProblem) -> int:
+    """How many of the 4^k combinations of states have a solution, by linear programs."""
+    Q, q, V, s, k = problem.Q, problem.q.ravel(), problem.V, problem.s, problem.contacts
+    n, p = V.shape
+    u, r = np.hstack([Q, V]), np.eye(n, n + p)
+    balance, found = np.hstack([V.T, np.zeros((p, p))]), 0
+    for states in itertools.product(("open", "stick", 1, -1), repeat=k):
+        zero, positive = list(zip(balance, -s)), []  # rows, and what they are at x = 0, negated
+        for i, state in enumerate(states):
+            a, b = slice(2 * i, 2 * i + 1), slice(2 * i + 1, 2 * i + 2)
+            bound = problem.mu[i] * r[a]
+            if state == "open":
+                zero += [(r[2 * i], 0.0), (r[2 * i + 1], 0.0)]
+                positive.append((u[2 * i], -q[2 * i]))
+                continue
+            zero.append((u[2 * i], -q[2 * i]))
+            positive.append((r[2 * i], 0.0))
+            if state == "stick":
+                zero.append((u[2 * i + 1], -q[2 * i + 1]))
+                positive += [((bound - r[b])[0], 0.0), ((bound + r[b])[0], 0.0)]
+            else:
+                zero.append(((r[b] + state * bound)[0], 0.0))
+                positive.append((state * u[2 * i + 1], -state * q[2 * i + 1]))
+        (A, b), (C, d) = (map(np.array, zip(*rows)) for rows in (zero, positive))
+        answer = linprog(np.zeros(n + p), -C, -d, A, b, bounds=(None, None))
+        found += answer.status == 0
+    return found
+
+
+def partly_held(seed: int) -> InterfaceProblem:
+    """A problem of 1 to 3 contacts; nothing moves some components, most of which are at rest."""
+    rng = np.random.default_rng(seed)
+    k = int(rng.integers(1, 4))
+    n, p = 2 * k, int(rng.integers(0, 2))
+    B = rng.integers(-2, 3, size=(n, n))
+    held = rng.uniform(size=n) < 0.5
+    Q = B @ B.T * np.outer(~held, ~held)
+    rest = held & (rng.uniform(size=n) < 0.8)
+    q, V = rng.integers(-3, 4, size=n) * ~rest, rng.integers(-1, 2, size=(n, p)) * ~rest[:, None]
+    mu, s = rng.choice([0.0, 0.3, 0.5, 1.0, 2.0], size=k), rng.integers(-3, 3, size=p)
+    return InterfaceProblem(Q.astype(float), q.reshape(k, 2).astype(float), mu, V, s)
+
+
+def test_a_normal_force_that_moves_nothing_still_bounds_friction():
+    """Only what carries no force that matters is left out of proofs and of lists of solutions."""
+    counts = []
+    for seed in range(45):
+        problem = partly_held(seed)
+        counts.append(feasible_states(problem))
+        assert bool(all_solutions(problem)) == (counts[-1] > 0), seed
+        try:
+            assert solve(problem).solved == (counts[-1] > 0), seed
+        except InputError:  # nothing can balance the load
+            assert counts[-1] == 0, seed
+    assert min(counts) == 0 and max(counts) > 1

@@ -501,3 +501,14 @@ def test_no_statement_has_a_threshold_at_infinity():
     """Without a coupling of normal and tangential motion friction loses nothing."""
     text = str(diagnose(InterfaceProblem(np.eye(2), np.array([[-1.0, 0.3]]), mu=0.5)))
     assert "uniqueness for every load and every mu" in text and "mu < inf" not in text
+
+
+@pytest.mark.parametrize("q_n", [0.0, 0.5, -1.0])
+def test_what_holds_for_every_load_does_not_know_the_load(q_n):
+    """A normal force that moves nothing holds any friction; a tangential one changes nothing."""
+    normal, tangential = (
+        str(diagnose(InterfaceProblem(np.diag(Q), [[q_n, -1.0]], 0.5)))
+        for Q in ([0, 4.0], [1.0, 0])
+    )
+    assert "uniqueness (but for the forces of held components) is not guaranteed" in normal
+    assert "(but for the forces of held components) for every load and every mu" in tangential

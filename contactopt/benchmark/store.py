@@ -35,7 +35,8 @@ STATUSES = {status.label: status.sentence for status in Status} | ENDS
 TYPES = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}  # in a table
 REFERENCE = 1e-8  # largest residual of a reference solution
 UNKNOWN = {"int": 0, "str": "", "float": np.nan, "bool": False}  # what stands for no value yet
-LATER = ("error", "calibration")  # columns that load() works out, or that older rows do not have
+# columns that load() works out, or that older rows do not have
+LATER = "error", "calibration", "states", "bridge_seconds"
 ANSWERS = "answers.npz"  # beside the table
 ABSENT = "absent"  # status of the row of a method that is not there
 _log = logging.getLogger(__name__)

@@ -7,8 +7,9 @@ are those of the whole body.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -156,7 +157,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             f" {mesh.p[0].min():g}."
         )
     known = mesh.boundaries or {}
-    names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
+    names = [*scene.surfaces_of(part), *(name for s in part.supports for name in s.faces(known))]
     names += [load.boundary for load in part.loads if load.boundary]
     filled = sorted(boundary for boundary, facets in known.items() if len(facets))
     for name in names:
@@ -288,7 +289,7 @@ class Constraints:
     """What supports and plates do to the n unknowns of a body, one after the other.
 
     numbers  (dim, nodes) the unknowns of each node
-    nodes    function from the name of a boundary to the nodes on it
+    known    the boundaries, and nodes, the function from the name of one to the nodes on it
     held     (n,) mask of the unknowns that are not free
     columns  (n,) unit motion of each plate component that moves. The others are as in Assembly.
     """
@@ -296,6 +297,7 @@ class Constraints:
     scene: Scene
     part: Any
     numbers: np.ndarray
+    known: Mapping[str, Any]
     nodes: Callable[[str], np.ndarray]
     prescribed: np.ndarray
     held: np.ndarray
@@ -327,7 +329,13 @@ class Constraints:
             if values is None:
                 values = dict.fromkeys(self.scene.components, 0.0)
             for component, value in values.items():
-                where = self.unknowns(support.boundary, component)
+                faces = support.faces(self.known)
+                where = reduce(np.intersect1d, (self.unknowns(f, component) for f in faces))
+                if not len(where):
+                    raise InputError(
+                        f"body '{self.part.name}': the boundaries of the support on"
+                        f" {support.boundary!r} share no node; name boundaries that meet."
+                    )
                 if np.any(self.held[where] & (self.prescribed[where] != value)):
                     raise InputError(
                         f"body '{self.part.name}': the support on {support.boundary!r} prescribes"
@@ -375,4 +383,4 @@ def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> Constraint
         return nodes_on(basis, scene.degree, np.asarray(basis.mesh.boundaries[boundary]))
 
     none = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
-    return Constraints(scene, part, node_unknowns(basis), nodes, *none)
+    return Constraints(scene, part, node_unknowns(basis), basis.mesh.boundaries, nodes, *none)

@@ -16,9 +16,9 @@ BLOCK = 2000
 ROUNDING = 1e-12  # share of |A| |U| below which internal forces A U are rounding
 
 
-def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
+def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0.0) -> Validity:
     """How far a body is from equilibrium under the contact forces (n,), on free unknowns and on the
-    sum over each plate's, strained and turned.
+    sum over each plate's, strained and turned. Forces whose sum is at most `least` are none.
     """
     internal = body.A @ U
     missing = internal - body.load - force
@@ -26,7 +26,8 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray) -> Validity:
     applied = max(np.abs(part).sum() for part in (force, body.load, body.plate_forces))
     size = max(applied, np.abs(np.delete(internal, body.free)).sum())
     unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
-    if applied == 0 and size <= ROUNDING * float((abs(body.A) @ np.abs(U)).sum()):
+    rounding = ROUNDING * float((abs(body.A) @ np.abs(U)).sum())
+    if applied <= least and size <= max(least, rounding):
         unbalanced = 0.0  # supports move the body as a whole: all forces are rounding
     gradient = _middle_gradient(body.basis, U)
     turned = gradient.swapaxes(1, 2)

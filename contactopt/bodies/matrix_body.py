@@ -277,7 +277,7 @@ def _held(
 ) -> Constraints:
     """What holds the n unknowns: `fixed`, supports, plates, and others that they follow."""
     none = np.zeros(n), np.zeros(n, dtype=bool)
-    made = Constraints(scene, part, numbers, lambda name: part.facets[name].ravel(), *none)
+    made = Constraints(scene, part, numbers, part.facets, _nodes_of(part), *none)
     follows, fixed = _follows(D), {} if part.fixed is None else part.fixed
     if not isinstance(fixed, Mapping):
         fixed = dict.fromkeys(np.ravel(fixed).tolist(), 0.0)
@@ -307,6 +307,10 @@ def _held(
     if made.held.all():
         raise InputError(f"body '{part.name}' is held at all its unknowns; nothing of it deforms.")
     return made
+
+
+def _nodes_of(part: MatrixPart) -> Callable[[str], np.ndarray]:
+    return lambda name: np.asarray(part.facets[name], dtype=int).ravel()
 
 
 def _coupled(K: sp.csr_matrix, numbers: np.ndarray) -> sp.csr_matrix:

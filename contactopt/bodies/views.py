@@ -90,10 +90,10 @@ def fields(body: Body, U: np.ndarray) -> Fields | None:
     return None if elements is None else element_stress.fields_of(elements, U)
 
 
-def limits(body: Body, U: np.ndarray, force: np.ndarray) -> Validity:
+def limits(body: Body, U: np.ndarray, force: np.ndarray, least: float = 0.0) -> Validity:
     """How far a body is from equilibrium, strained and turned; zeros without elements."""
     elements = elements_of(body)
-    return Validity() if elements is None else element_stress.limits_of(elements, U, force)
+    return Validity() if elements is None else element_stress.limits_of(elements, U, force, least)
 
 
 def recovery_errors(body: Body, U: np.ndarray, *others: np.ndarray) -> tuple[np.ndarray, ...]:

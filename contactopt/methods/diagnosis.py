@@ -122,6 +122,8 @@ class Diagnosis:
     def _threshold(self, name: str, what: str, field: str) -> str:
         """What is guaranteed up to which friction, and where it is lost, rounded safely."""
         low, high = getattr(self.guaranteed, field), getattr(self.uniform_slip, field)
+        if self.held and field == "unique":
+            what += " (but for the forces of held components)"
         if low == np.inf:
             return f"{name}: {what} for every load and every mu"
         if self.exact and low == high:
@@ -194,7 +196,8 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
     eigenvalues = la.eigvalsh((problem.Q + problem.Q.T) / 2)
     skew = float(np.linalg.norm(problem.Q - problem.Q.T) / (np.linalg.norm(problem.Q) or 1.0))
     energy = skew <= SYMMETRIC
-    guaranteed, uniform, exact = thresholds(scaled, shape, energy)
+    unloaded = dimensionless(problem.altered(q=0.0 * problem.q))[0]  # for every load
+    guaranteed, uniform, exact = thresholds(unloaded, shape, energy)
     return Diagnosis(
         contacts=problem.contacts,
         dim=problem.dim,
@@ -210,7 +213,7 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
         exact=exact,
         relaxation=_relaxation(scaled) if energy else "none",
         local=None if solution is None else _at(problem, solution, scaled, scales, largest),
-        dragged=not normal_plates(scaled),
+        dragged=not normal_plates(unloaded),
     )
 
 

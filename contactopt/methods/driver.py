@@ -346,7 +346,7 @@ class _Recorder:
         if self.lengthless:
             # The same forces solve the problem with u = V lambda = 0, and rounding has no length to
             # be small beside.
-            self.multipliers = np.zeros(len(lam))
+            self.multipliers = np.zeros(len(self.problem.s))
         self.certify(known)
         change = _relative(self.reactions[:, 1:], previous[:, 1:])
         state = np.concatenate([r.ravel(), lam])

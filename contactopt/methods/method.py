@@ -27,19 +27,8 @@ class Method(Protocol):
         ...
 
     def backends(self, dim: int) -> tuple[str, str]:
-        """Name the backends that the method needs.
-
-        Parameters
-        ----------
-        dim : Number of components of a contact, 2 or 3.
-
-        Returns
-        -------
-        The normal and the tangential backend, NATIVE where it needs none.
-
-        Raises
-        ------
-        InputError : If one cannot be used.
+        """The normal and the tangential backend for dim 2 or 3, NATIVE where the method needs none.
+        InputError if one cannot be used.
         """
         return NATIVE, NATIVE
 

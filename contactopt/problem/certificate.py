@@ -70,6 +70,7 @@ DUST = 1e-5  # share of the force that closes the gaps below which forces are ro
 UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
 # rounding of r - rho u, over r, and how many times F the forces are from where on it counts
 ROUNDING, UNSEEN = 2.0**-52, 1e4
+CANCELLED = 4 * ROUNDING  # share of a gap, up to which what a motion leaves of it is none
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
@@ -132,7 +133,10 @@ def natural_map_residual(
     if len(r) == 0:
         return balance_residual(problem, r)
     d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
-    w = problem.q + (problem.V @ lam).reshape(r.shape) if len(lam) else problem.q
+    w = problem.q
+    if len(lam):
+        w = w + (problem.V @ lam).reshape(r.shape)
+        w[np.abs(w) <= CANCELLED * np.abs(problem.q)] = 0.0
     u = d + w
     measure = yardsticks(problem, r, d, w)
     beyond = lengths(r[:, 1:]) - problem.law.bound_along(r)

@@ -134,14 +134,21 @@ def without_rounding(V: np.ndarray) -> np.ndarray:
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """The components (k dim,) that neither forces nor multipliers nor q move, as a mask."""
-    d = np.abs(diagonal(problem.Q))
+    """The components (k dim,) that neither forces nor multipliers nor q move, and whose forces move
+    nothing, as a mask. A normal force that bounds the friction of a component that moves is none of
+    them: it matters.
+    """
+    d, law = np.abs(diagonal(problem.Q)), problem.law
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]
     held = np.all([size <= NOISE * size.max(initial=0.0) for size in moves], axis=0)
     if held.any() and has_entries(problem.Q):
-        rows = np.flatnonzero(held)
-        held[rows] = row_sizes(problem.Q[rows]) <= NOISE * d.max(initial=0.0)
-    return held
+        for entries in (problem.Q, problem.Q.T):  # which differ where Q is unsymmetric
+            rows = np.flatnonzero(held)
+            own = sp.csr_array(entries[rows]) if sp.issparse(entries) else entries[rows]
+            held[rows] = row_sizes(own) <= NOISE * d.max(initial=0.0)
+    held = held.reshape(problem.q.shape)
+    held[:, 0] &= held[:, 1:].all(axis=1) | ~law.rough | (not law.proportional)
+    return held.ravel()
 
 
 def _closing(problem: InterfaceProblem) -> float:

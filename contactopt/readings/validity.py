@@ -15,6 +15,7 @@ import numpy as np
 from contactopt.bodies.views import limits
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
@@ -84,9 +85,9 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     bodies: dict[str, dict[str, float]] = {}
     remarks: list[str] = []
     moved = reduction.seen(displaced)
-    scale = np.zeros(len(moved))
+    scale, none = np.zeros(len(moved)), TOL * float(np.abs(reactions).sum())
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        known = bodies[body.name] = limits(body, U, B.T @ reactions)._asdict()
+        known = bodies[body.name] = limits(body, U, B.T @ reactions, none)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
         if known["imbalance"] > BOUNDS["imbalance"]:

@@ -49,7 +49,8 @@ def project_balanced(
     k, d = y.shape
     rho = np.broadcast_to(np.asarray(step, dtype=float), (k,))[:, None]
     size = np.abs(s) + np.abs(V).sum(axis=0) * 1e-3
-    ridge = CURVATURE * np.diag(np.sum(rho[:, :, None] * V.reshape(k, d, -1) ** 2, axis=(0, 1)))
+    felt = np.sum(rho[:, :, None] * V.reshape(k, d, -1) ** 2, axis=(0, 1))
+    ridge = CURVATURE * np.diag(np.where(felt > 0, felt, 1.0))  # no force feels some motions
     z = y - rho * (V @ lam).reshape(k, d)
     for _ in range(steps):
         check_time()

@@ -173,6 +173,7 @@ class StateTree:
                 continue
             x = branch.x()
             r, lam = x[: self.n].reshape(self.problem.q.shape), x[self.n :]
+            r[branch.sides[: len(r), 1]] = 0.0  # of open contacts, without rounding
             u = self.problem.displacements(r, lam)
             more = (self._plane if self.problem.dim == 2 else self._space)(branch, r, u)
             waiting += more

@@ -115,57 +115,23 @@ class Law:
         return self
 
     def stretch(self, dim: int) -> np.ndarray | None:
-        """Compute variables in which friction is the same in all directions of the surface.
-
-        Parameters
-        ----------
-        dim : Number of components of a contact.
-
-        Returns
-        -------
-        Symmetric matrices S (k, dim - 1, dim - 1): where r_t = S y_t and u_t = S^-1 v_t obey this
-        law, y_t and v_t obey `plain`. None: the law is `plain` itself, S = 1.
+        """Symmetric S (k, dim - 1, dim - 1): where r_t = S y_t and u_t = S^-1 v_t obey this law,
+        y_t and v_t obey `plain`, which is the same in all directions. None: S = 1.
         """
         return None
 
     def bound(self, r_n: np.ndarray) -> np.ndarray:
-        """Compute the largest tangential force that each contact can carry in any direction.
-
-        Parameters
-        ----------
-        r_n : (k,) normal forces [force].
-
-        Returns
-        -------
-        (k,) largest |r_t| [force].
-        """
+        """(k,) the largest |r_t| [force] in any direction under normal forces r_n (k,)."""
         raise NotImplementedError
 
     def bound_along(self, r: np.ndarray) -> np.ndarray:
-        """Compute the largest tangential force that each contact can carry in the direction of r_t.
-
-        Parameters
-        ----------
-        r : (k, dim) contact forces, normal first [force].
-
-        Returns
-        -------
-        (k,) largest |r_t| [force].
-        """
+        """(k,) the largest |r_t| [force] in the direction of r_t, for forces r (k, dim)."""
         return self.bound(r[:, 0])
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
-        """Project points on the set K of forces, with the generalised derivative of the projection.
-
-        Parameters
-        ----------
-        y : (k, dim) points, normal first [force].
-        r_n : (k,) normal forces that say which set K is, where it depends on them. The derivative
-            takes them as given.
-
-        Returns
-        -------
-        The nearest points (k, dim), and their derivatives (k, dim, dim).
+        """The points (k, dim) of the set K of forces nearest to y, and their generalised
+        derivatives (k, dim, dim). Where K depends on the normal force, it is that of r_n (k,),
+        taken as given.
         """
         raise NotImplementedError
 
@@ -174,15 +140,8 @@ class Law:
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
-        """Evaluate the map P of Newton's equations r = P(r - rho u), with its derivative.
-
-        Parameters
-        ----------
-        y : (k, dim) points, normal first [force].
-
-        Returns
-        -------
-        P(y) (k, dim), and its generalised derivatives (k, dim, dim).
+        """The map P(y) (k, dim) of Newton's equations r = P(r - rho u), and its generalised
+        derivatives (k, dim, dim).
         """
         return self.nearest_derivative(y, y[:, 0])
 
@@ -191,15 +150,8 @@ class Law:
         return self.project(y)[0]
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
-        """Differentiate `project` by the law's parameter at each contact.
-
-        Parameters
-        ----------
-        y : (k, dim) points, normal first [force].
-
-        Returns
-        -------
-        (k, dim) derivatives. InputError for a law that does not know them.
+        """Derivatives (k, dim) of `project` by the law's parameter at each contact. InputError for
+        a law that does not know them.
         """
         raise InputError(
             f"the law {type(self).__name__} has no derivative by its parameter"
@@ -207,17 +159,7 @@ class Law:
         )
 
     def kinks(self, y: np.ndarray, distance: float) -> Kinks:
-        """Find the contacts whose point lies near a kink of `project`.
-
-        Parameters
-        ----------
-        y : (k, dim) points, normal first [force].
-        distance : How near counts [force].
-
-        Returns
-        -------
-        Two masks (k,).
-        """
+        """The contacts whose point lies within a distance [force] of a kink of `project`."""
         normal = (np.abs(y[:, 0]) <= distance) & ((self.lowest == 0) | self.rough)
         slack = lengths(y[:, 1:]) - self.bound_along(y)
         return Kinks(normal, (np.abs(slack) <= distance) & self.rough & (normal | ~self.idle(y)))
@@ -231,29 +173,11 @@ class Law:
         return out
 
     def idle(self, y: np.ndarray) -> np.ndarray:
-        """Tell at which points `project` and its derivative are sure to be zero.
-
-        Parameters
-        ----------
-        y : (k, dim) points, normal first [force].
-
-        Returns
-        -------
-        (k,) mask.
-        """
+        """(k,) mask of the points at which `project` and its derivative are sure to be zero."""
         return np.zeros(len(y), dtype=bool)
 
     def opening(self, u_t: np.ndarray) -> np.ndarray:
-        """Compute what is added to the gap where contacts slip.
-
-        Parameters
-        ----------
-        u_t : (k, dim - 1) tangential displacements [length].
-
-        Returns
-        -------
-        g (k,) [length].
-        """
+        """g (k,) [length], what slip u_t (k, dim - 1) adds to the gap."""
         return np.zeros(len(u_t))
 
     def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float) -> np.ndarray:
@@ -263,30 +187,12 @@ class Law:
         return self.nearest(shifted, r[:, 0])
 
     def pressed(self, r: np.ndarray) -> np.ndarray:
-        """Tell which contacts touch: they carry a normal force beyond rounding, or cannot open.
-
-        Parameters
-        ----------
-        r : (k, dim) contact forces, normal first [force].
-
-        Returns
-        -------
-        (k,) mask.
-        """
+        """(k,) mask of the contacts that carry a normal force beyond rounding, or cannot open."""
         size = np.abs(r[:, 0])
         return np.asarray((size > PRESSED * size.max(initial=0.0)) | (self.lowest < 0))
 
     def sticking(self, r: np.ndarray) -> np.ndarray:
-        """Tell which contacts are pressed and carry a tangential force below its bound.
-
-        Parameters
-        ----------
-        r : (k, dim) contact forces, normal first [force].
-
-        Returns
-        -------
-        (k,) mask.
-        """
+        """(k,) mask of the pressed contacts with a tangential force below its bound."""
         return self.pressed(r) & (lengths(r[:, 1:]) < (1 - BELOW) * self.bound_along(r))
 
     def scaled(self, force: float) -> Self:
@@ -323,16 +229,8 @@ class Law:
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Law:
-        """Make the law of a scene's contacts from the values that the scene gives.
-
-        Parameters
-        ----------
-        values : Friction coefficients, unless the law says otherwise: one, or one per contact (k,).
-        place : Where the contacts are.
-
-        Returns
-        -------
-        The law of the k contacts. InputError on values of another shape.
+        """The law of the k contacts of a scene, from the values that it gives: friction
+        coefficients, unless the law says otherwise, one or (k,). InputError on another shape.
         """
         if values.shape not in ((), place.areas.shape):
             raise InputError(
