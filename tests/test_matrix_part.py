@@ -3,11 +3,14 @@
 Its matrices are assembled here with scikit-fem alone, so that they know nothing of ours.
 """
 
+from dataclasses import replace
+
 import meshio
 import numpy as np
 import pytest
 import scipy.sparse as sp
 import skfem
+from scipy.io import mmread
 from scipy.sparse.linalg import splu
 from scipy.spatial import KDTree
 from skfem.models.elasticity import lame_parameters, linear_elasticity
@@ -25,11 +28,14 @@ from contactopt import (
     Traction,
     follow,
     gradient,
+    reduce,
     reduce_bodies,
     run,
+    scenes,
     simplify,
     solve,
 )
+from contactopt.coupling.matrices import write_matrices
 
 E, NU = 70.0, 0.3
 SIMPLEX = {2: skfem.MeshTri, 3: skfem.MeshTet}
@@ -391,3 +397,57 @@ def test_a_run_writes_displacements_and_pictures_of_the_contact(tmp_path):
     total = made.point_data["force"].sum(axis=0)
     assert np.allclose(total[1:], [-1, 0], atol=1e-9)
     assert np.allclose(made.point_data["reaction"].sum(axis=0) + total, 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("form", ["npz", "mtx"])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_what_export_writes_gives_the_same_problem(rigid, form, tmp_path):
+    """By dense algebra alone: u(r) = sum B U(r) + gap is Q r + V lambda + q for every r that
+    balances the loads; and as MatrixPart it reduces to the same problem.
+    """
+    out = tmp_path / "made"
+    scene = scenes.flat_punch(2, elements=4)
+    if rigid:
+        scene = replace(scene, upper=Rigid("punch", force={"y": -1.0}))
+    write_matrices(reduce_bodies(scene), out, form)
+    problem = reduce(scene)
+
+    def read(key):
+        if form == "mtx":
+            made = mmread(out / f"{key}.mtx")
+            return made.toarray() if sp.issparse(made) else made
+        with np.load(out) as file:
+            if key in file:
+                return file[key]
+            own = (file[f"{key}.{part}"] for part in ("data", "indices", "indptr"))
+            return sp.csr_matrix(tuple(own), file[f"{key}.shape"]).toarray()
+
+    q, V = read("q").ravel(), read("V").reshape(problem.q.size, -1)
+    s = read("s").ravel()
+    assert np.allclose(read("Q"), problem.Q) and np.allclose(V, problem.V)
+    r = np.random.default_rng(0).standard_normal(q.size)
+    r -= V @ np.linalg.lstsq(V.T @ V, V.T @ r + s, rcond=None)[0] if V.size else 0
+    u = 0 * r
+    for part in scene.meshed.values():
+        K, f, N, g, p, B = (read(f"{part.name}.{own}") for own in ("K", "f", "N", "g", "p", "B"))
+        f, g, p = f.ravel(), g.ravel(), p.ravel()
+        v = np.linalg.lstsq(N.T @ K @ N, N.T @ (f - K @ g + B.T @ r) + p, rcond=1e-12)[0]
+        u += B @ (g + N @ v)
+    gap = reduce_bodies(scene).gap
+    rest = problem.Q @ r + q - u
+    rest[:: problem.dim] -= gap
+    rest -= V @ np.linalg.lstsq(V, rest, rcond=None)[0] if V.size else 0
+    assert np.abs(rest).max() < 1e-9 * np.abs(u).max()
+    (part, *_) = scene.meshed.values()
+    N, K, f, g, p = (read(f"{part.name}.{own}") for own in ("N", "K", "f", "g", "p"))
+    load = N.T @ (f.ravel() - K @ g.ravel()) + p.ravel()
+    facets = {part.contact: read(f"{part.name}.facets.{part.contact}").astype(int)}
+    given = MatrixPart(
+        part.name, N.T @ K @ N, load, read(f"{part.name}.points"), facets, contact=part.contact,
+        order=read(f"{part.name}.unknowns"), constraints=sp.csr_matrix(N),
+    )  # fmt: skip
+    again = reduce(scene.with_parts(lambda own: given if own is part else own))
+    # the free motion of a plate is measured elsewhere, which moves Q along V
+    forces = [solve(own, tol=1e-13).reactions for own in (again, problem)]
+    assert np.allclose(*forces, atol=1e-10 * np.abs(forces[0]).max())
+    assert np.allclose(np.abs(again.s), np.abs(problem.s))

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 
-from contactopt.bodies.elements import Trace, Weight, node_unknowns
+from contactopt.bodies.elements import Trace, Weight, node_unknowns, nodes_on
 from contactopt.bodies.motions import Motions
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.bodies.stiffness import isotropic_stiffness
@@ -38,6 +38,7 @@ class Matrices:
                    InputError if other unknowns are held or driven
     unknowns       (dim, nodes) those of every node;   locations  (dim, nodes) its coordinates
     surface_nodes  (m,) all nodes of the contact boundaries
+    facets         name of each contact boundary -> (f, j) nodes of its facets, corners first
     """
 
     name: str
@@ -60,6 +61,8 @@ class Matrices:
         def locations(self) -> np.ndarray: ...
         @property
         def surface_nodes(self) -> np.ndarray: ...
+        @property
+        def facets(self) -> Mapping[str, np.ndarray]: ...
 
     @property
     def contact_dofs(self) -> np.ndarray:
@@ -151,6 +154,13 @@ class Assembly(Matrices):
     def points(self) -> np.ndarray:
         """Coordinates of the contact nodes, (dim, k)."""
         return self.locations[:, self.nodes]
+
+    @property
+    def facets(self) -> Mapping[str, np.ndarray]:
+        known = self.basis.mesh.boundaries
+        return {
+            name: nodes_on(self.basis, self.degree, np.asarray(known[name])) for name in self.traces
+        }
 
     @cached_property
     def surface_nodes(self) -> np.ndarray:

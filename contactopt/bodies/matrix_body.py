@@ -11,17 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Mesh, Surface, Work
-from contactopt.bodies.assembled_elastic import trace_of
-from contactopt.bodies.assembly import Matrices
+from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
+from contactopt.bodies.assembled_elastic import PLANE, trace_of
 from contactopt.bodies.bare_facets import bare_surface, ordered, turned_outwards
 from contactopt.bodies.body import Constraints
 from contactopt.bodies.elastic import ElasticBody, condense
+from contactopt.bodies.given_matrices import GivenMatrices
 from contactopt.bodies.matrix_checks import (
     check_definite,
     check_isolated,
@@ -31,91 +30,11 @@ from contactopt.bodies.matrix_checks import (
 )
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
-from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.checks import place_words, real_array
 from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
 from contactopt.scenes.matrix_part import MatrixPart
 from contactopt.scenes.scene import Scene
-
-# (dimension, points of a facet) -> what VTK calls it
-CELLS = {
-    (2, 2): "line", (2, 3): "line3", (3, 3): "triangle", (3, 4): "quad", (3, 6): "triangle6",
-    (3, 8): "quad8", (3, 9): "quad9",
-}  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class GivenMatrices(Matrices):
-    """The matrices of a MatrixPart.
-
-    surfaces  name of each contact surface -> the surface
-    moving    (dim N, n) D: the displacements of the points in the caller's numbering
-    solves    function that solves K U = F, if K itself is not known
-    facets    name of each surface -> (m, j) points of its facets, as they are given
-    """
-
-    unknowns: np.ndarray
-    locations: np.ndarray
-    surfaces: Mapping[str, Surface]
-    moving: sp.csr_matrix
-    solves: Callable[[np.ndarray], np.ndarray] | None
-    facets: Mapping[str, np.ndarray]
-
-    @property
-    def contact_dofs(self) -> np.ndarray:
-        traces = [trace for own in self.surfaces.values() for trace in own.traces]
-        return np.unique(np.concatenate([trace.indices for trace in traces]))
-
-    def at_points(self, U: np.ndarray) -> np.ndarray:
-        """(dim, N) displacements of the points, from those of the unknowns (n,)."""
-        return np.asarray((self.moving @ U)[self.unknowns])
-
-    def write_vtu(self, path: Path, U: np.ndarray, force: np.ndarray) -> None:
-        """Write the points and the facets of all surfaces with the displacement, the contact forces
-        and, where K is known, the forces of supports and plates at the points.
-        """
-        import meshio
-
-        data = {"displacement": self.at_points(U), "force": force[self.unknowns]}
-        if self.solves is None:
-            missing = self.A @ U - self.load - force
-            missing[self.free] = 0.0
-            data["reaction"] = missing[self.unknowns]
-        lack = 3 - len(self.locations)
-        cells = [
-            (CELLS[len(self.locations), facets.shape[1]], facets) for facets in self.facets.values()
-        ]
-        vectors = {name: np.pad(each, ((0, lack), (0, 0))).T for name, each in data.items()}
-        points = np.pad(self.locations.T, ((0, 0), (0, lack)))
-        meshio.Mesh(points, cells, vectors).write(path, file_format="vtu")
-
-    def solver(self, system: System) -> BodySolver | None:
-        return None if self.solves is None else _GivenSolver(system, self)
-
-
-class _GivenSolver(BodySolver):
-    """The caller's own solver."""
-
-    name = "given"
-
-    def __init__(self, system: System, body: GivenMatrices):
-        super().__init__(system)
-        self._body = body
-
-    def solve(self, load: np.ndarray, rtol: float | None = None) -> np.ndarray:
-        body, made = self._body, []
-        assert body.solves is not None
-        full = np.zeros((load.size // max(len(load), 1), len(body.load)))
-        full[:, body.free] = load.reshape(len(load), -1).T
-        for own in full:
-            made.append(np.asarray(body.solves(own)).ravel())
-            if made[-1].shape != own.shape or not np.isfinite(made[-1]).all():
-                raise InputError(
-                    f"body '{body.name}': its function gave an array of shape {made[-1].shape}, or"
-                    f" numbers that are not finite, for forces of shape {own.shape}."
-                )
-        return np.stack(made, axis=1)[body.free].reshape(load.shape)
 
 
 class _SolvedBody(ElasticBody):
@@ -155,7 +74,9 @@ class MatrixBody(AssembledBody):
         body, first = self.body, self.body.unknowns[0]
         if body.solves is not None:
             return Work()
-        graph, x = body.A[first][:, first], body.locations[:, : len(first)]
+        # points that constraints leave out of K are points of the graph, too
+        graph = sp.csr_matrix(abs(body.A[first][:, first]) + sp.identity(len(first)))
+        x = body.locations
         kept = np.flatnonzero(np.isin(body.unknowns, body.contact_dofs).any(axis=0))
         sizes = (elimination_work(graph, x, own) for own in (kept[:0], kept))
         return Work(body.A.nnz, len(body.contact_dofs), *sizes)
@@ -168,6 +89,23 @@ class MatrixBody(AssembledBody):
                 f" {', '.join(sorted(self.body.surfaces))}."
             )
         return self.body.surfaces[name]
+
+    def guides(self) -> Guides:
+        """Coordinate planes, the body on one side, all of whose points are held along the axis, and
+        not in all components.
+        """
+        body, x = self.body, self.body.locations
+        extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
+        near = PLANE * float(np.ptp(extent, axis=1).max())
+        still = np.ones(len(body.load), dtype=bool)
+        still[body.free] = False
+        still, planes = (still & (body.prescribed == 0))[body.unknowns], []
+        for axis, ends in enumerate(extent):
+            for place, sign in zip(ends, (1.0, -1.0)):
+                on = still[:, np.abs(x[axis] - place) <= near]
+                if on[axis].all() and not on.all():
+                    planes.append((axis, float(place), sign))
+        return Guides(extent, tuple(planes))
 
     def prepare(self, solver: str, entries: bool) -> ElasticBody:
         try:

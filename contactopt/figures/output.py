@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from contactopt.bodies.matrix_body import GivenMatrices
+from contactopt.bodies.given_matrices import GivenMatrices
 from contactopt.figures.style import FORMATS, save_figure
 from contactopt.outcome import Outcome, squeeze
 from contactopt.problem import alone, part_of

@@ -125,7 +125,7 @@ class MatrixPart:
                         f"its {what} must be {kind.__name__} objects, and all other loads belong in"
                         f" f; got {short(item)}."
                     )
-                names = item.faces(self.facets) if kind is Support else (item.boundary,)
+                names = item.boundary.split("/")
                 if not set(names) <= set(self.facets):
                     raise self._wrong(
                         f"there are no facets {item.boundary!r} to hold or drive; it has"
