@@ -1,4 +1,4 @@
-"""The matrices of a body that another code has assembled, its solver if it gave one, and its files."""
+"""The matrices of a body that another code has assembled, its solver if it gave one, its file."""
 
 from __future__ import annotations
 
