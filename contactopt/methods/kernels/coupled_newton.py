@@ -47,7 +47,8 @@ from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
-USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.ways`)
+# V-cycles of all bodies for the bonded solution (`python -m experiments.questions.large_punch`)
+USUAL = 8
 IDLE = 3  # steps without progress after which it begins anew
 
 
