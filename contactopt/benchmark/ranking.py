@@ -277,7 +277,7 @@ def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             rng.integers(len(logs), size=(BATCH, len(logs))) for _ in range(RESAMPLES // BATCH)
         )
         ranks = [rankdata(logs[index].mean(axis=1), method="min", axis=1) for index in drawn]
-    low, high = np.percentile(np.concatenate(ranks), LIKELY, axis=0)
+    low, high = np.nan_to_num(np.percentile(np.concatenate(ranks), LIKELY, axis=0))
     return np.floor(low).astype(int), np.ceil(high).astype(int)
 
 
