@@ -57,6 +57,7 @@ def gone(problem, tol=1e-8, time_limit=1.0):
 
 SEPARATE = """
 from contactopt.benchmark import problem
+from contactopt.benchmark.sequences import Sequence
 from contactopt import InterfaceProblem
 from contactopt.problem.laws.coulomb import Coulomb
 import numpy as np
@@ -65,6 +66,10 @@ import numpy as np
 def separate():
     Q, q = np.diag([1.0, 2.0, 3.0, 4.0]), np.array([[-100.0, 0.0], [5.0, 0.0]])
     return InterfaceProblem(Q, q, Coulomb(np.full(2, 0.5)))
+
+@problem
+def several():
+    return Sequence((separate(),) * 5)
 """
 
 
@@ -80,7 +85,7 @@ def test_a_peer_is_timed_where_it_runs_and_its_failures_cost_a_row_each(tmp_path
         time_limit = 1.0
         repeats = 2
         [[problems]]
-        family = "separate"
+        family = ["separate", "several"]
         [[methods]]
         method = "toy"
         trouble = ["", "doubts", "raises", "dies", "hangs"]
@@ -89,6 +94,9 @@ def test_a_peer_is_timed_where_it_runs_and_its_failures_cost_a_row_each(tmp_path
         optional = true
         """,
     )
+    along, table = table[table["states"] == 5], table[table["states"] == 1]
+    bridged = along[along["method"] == "toy(trouble='')"]
+    assert bridged["success"].all() and (bridged["bridge_seconds"] > 1.2).all()  # which is no limit
     first = table[table["repeat"] == 0].set_index("method")
     status = first["status"].to_dict()
     assert status["toy(trouble='')"] == "solved" and first.loc["toy(trouble='')", "claimed"]
@@ -103,7 +111,7 @@ def test_a_peer_is_timed_where_it_runs_and_its_failures_cost_a_row_each(tmp_path
     left = benchmark.load(tmp_path / "out", absent=True)
     (absent,) = left[left["status"] == "absent"].to_dict("records")
     assert absent["method"] == "gone" and "pip install gone" in absent["message"]
-    assert len(left) == len(table) + 1
+    assert len(left) == len(table) + len(along) + 1
 
 
 def test_a_plane_problem_reaches_a_peer_in_space_and_without_units():

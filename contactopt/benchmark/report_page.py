@@ -24,7 +24,6 @@ from contactopt.benchmark.experiment import Experiment, read_layout
 from contactopt.benchmark.merging import joined
 from contactopt.benchmark.ranking import (
     NOISE,
-    RESAMPLES,
     achieved,
     agreement,
     factors,
@@ -47,6 +46,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PAGE = "report.html"
+RESAMPLES = 400  # bootstrap samples of the problems, drawn again with each change of a filter
 ACCURACIES = (1e-3, 1e-6, 1e-8)  # certificates at which methods are ranked
 MOST_POINTS = 30  # of a curve of convergence
 COLUMNS_SHOWN = (
@@ -134,7 +134,8 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
         "cards": _cards(table, divided),
         "busy": unranked(table),
         "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(table, found)),
-        "colours": COLOURS[:7],
+        "colours": COLOURS[:6],
+        "resamples": RESAMPLES,
     }
 
 

@@ -72,7 +72,7 @@ class Quantity:
         return Reading(self.slopes(State(reduction, solution)).value)
 
 
-def find_quantity(name: Any, scene: Scene) -> Quantity:
+def find_quantity(name: object, scene: Scene) -> Quantity:
     """Find a quantity by its name in this module's head, before anything is solved. InputError for
     what the scene does not have.
     """
@@ -102,7 +102,7 @@ def unit_of(name: str, units: tuple[str, str]) -> str:
     return known.get(name.partition(":")[0], stress)
 
 
-def quantity_of_states(name: Any, states: Sequence[Scene]) -> Quantity:
+def quantity_of_states(name: object, states: Sequence[Scene]) -> Quantity:
     """As `find_quantity`, for a scene or the states of its load path: InputError also for a
     quantity of paths where there is one state only.
     """

@@ -100,6 +100,8 @@ def starts(table) -> list[str]:  # type: ignore[no-untyped-def]
     hot, cold = found[warm], found[~warm]
     cold.index = cold.index.str.replace("warm=False", "warm=True")
     hot, cold = hot.align(cold, join="inner")
+    if hot.empty:
+        raise InputError("no sequence was run from both.")
     both = np.isfinite(hot) & np.isfinite(cold)
     ratios = {
         m: ratio(hot.loc[both[m], m], cold.loc[both[m], m], 0.0)

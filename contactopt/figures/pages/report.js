@@ -1,6 +1,6 @@
 const data = JSON.parse(await unsqueezed("data"));
 const get = (id) => document.getElementById(id);
-const GREY = "#bbbbbb", SHIFT = 1e-3, BINS = 6, RESAMPLES = 400, MOST = 500;  // seconds; of a tag; bootstrap samples; rows of a table at a time
+const GREY = "#bbbbbb", SHIFT = 1e-3, BINS = 6, MOST = 500;  // seconds; groups of a tag; rows of a table at a time
 const runs = data.points.map((row) => ({...Object.fromEntries(data.columns.map((name, i) => [name, row[i]])), method: data.methods[row[1]], problem: data.problems[row[0]].name}));
 const short = (value) => typeof value === "boolean" ? (value ? "yes" : "no") : typeof value === "number" && !Number.isInteger(value) ? String(Number(value.toPrecision(3))) : String(value ?? "-");
 const plainly = (value) => typeof value === "number" ? value.toExponential(0) : value;
@@ -23,7 +23,7 @@ function ranked() {  // the methods that take some of the chosen problems, compa
   const means = logs.map(mean), first = order(means), drawn = entrants.map(() => []);
   let seed = 1;
   const next = () => (seed = (seed * 16807) % 2147483647) / 2147483647;  // Park and Miller
-  for (let k = 0; k < RESAMPLES && solvable.length; k++) {
+  for (let k = 0; k < data.resamples && solvable.length; k++) {
     const at = solvable.map(() => Math.floor(next() * solvable.length));
     order(logs.map((own) => mean(at.map((i) => own[i])))).forEach((rank, i) => drawn[i].push(rank));
   }
@@ -44,7 +44,7 @@ function ranked() {  // the methods that take some of the chosen problems, compa
 function look(method) {  // the first external solvers have colours, the first methods of this project are dashed
   const own = ours.has(method), place = ranks.rows.filter((row) => ours.has(row.method) === own).findIndex((row) => row.method === method);
   const ink = place < 0 ? GREY : own ? ["#000000", "#666666"][place] ?? GREY : data.colours[place] ?? GREY;
-  return {name: method, ink, dash: own && ink !== GREY, wide: ink === GREY ? 1 : 2};
+  return {name: method, ink, dash: own && ink !== GREY, wide: ink === GREY ? 1 : 2, quiet: ink === GREY};
 }
 
 const RUN = [["method", "method", "solver"], ["asked", "tolerance"], ["certificate", "residual"], ["claimed", "claimed"], ["status", "status"], ["CPU [s]", "cpu"], ["lower quartile", "low"], ["upper quartile", "high"], ["wall [s]", "wall"], ["bridge [s]", "bridge"], ["memory [MB]", "memory"], ["repeats", "repeats"]];
@@ -99,7 +99,7 @@ function drawLeaders() {
     const ratios = solvable.map((p, i) => (times[p][m] ?? Infinity) / best[i]).filter(Number.isFinite).sort((a, b) => a - b);
     return {...look(method), steps: true, x: [1, ...ratios, most], y: [0, ...ratios.map((_, i) => (i + 1) / solvable.length), ratios.length / solvable.length]};
   }), "CPU time over the best method's [-]", "share of the problems solved", {x: "log", y: "share"});
-  for (const key of ["mu", "condition"]) chart(get(`over-${key}`), rows.map(({method, m}) => {
+  for (const key of ["mu", "condition"]) chart(get(`over-${key}`), rows.filter(({method}) => !look(method).quiet).map(({method, m}) => {
     const known = chosen.filter((p) => data.takes[p][m] && data.problems[p].tags[key] > 0).sort((a, b) => data.problems[a].tags[key] - data.problems[b].tags[key]);
     const bins = Array.from({length: BINS}, (_, i) => known.slice(Math.floor((i * known.length) / BINS), Math.floor(((i + 1) * known.length) / BINS))).filter((bin) => bin.length);
     return {...look(method), x: bins.map((bin) => data.problems[bin[Math.floor(bin.length / 2)]].tags[key]), y: bins.map((bin) => bin.filter((p) => times[p][m] !== null).length / bin.length)};
