@@ -93,7 +93,7 @@ class AssembledElastic(AssembledBody):
             trace.areas,
             trace.weights[:, nodes],
             places,
-            tuple(_trace(trace.weights, trace.nodes, row, held) for row in unknowns),
+            tuple(trace_of(trace.weights, trace.nodes, row, held) for row in unknowns),
             held[unknowns[:, trace.nodes]],
             trace.cells,
             self._mesh(name, held, curve),
@@ -136,7 +136,7 @@ class AssembledElastic(AssembledBody):
         return condense(self.body, solver, entries)
 
 
-def _trace(
+def trace_of(
     weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
 ) -> sp.csr_matrix:
     """One component of the displacement of the contacts (k,) in terms of all unknowns (n,), by
