@@ -48,9 +48,8 @@ def leaders(table) -> str:  # type: ignore[no-untyped-def]
 
 
 def repeats(table) -> str:  # type: ignore[no-untyped-def]
-    again = table["problem"].isin(table.loc[table["repeat"] > 0, "problem"])
-    part = table[again]
-    tau = agreement(*map(points, reruns(part)), ACCURACY) if len(part) else np.nan
+    part, other = reruns(table)
+    tau = agreement(points(part), points(other), ACCURACY) if len(part) else np.nan
     if not np.isfinite(tau):
         raise InputError("an order needs two solvers, each with even and odd repeats.")
     return (
