@@ -12,7 +12,7 @@ from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Wo
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import build_body
 from contactopt.bodies.elastic import ElasticBody, condense
-from contactopt.bodies.elements import mean_normals
+from contactopt.bodies.elements import Trace, mean_normals
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.bodies.thickness import thin_facets
@@ -20,6 +20,7 @@ from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve, check_curve
 from contactopt.scenes.scene import Part, Scene
 
+Traces = tuple[sp.csr_matrix, ...]
 PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
 
 
@@ -86,12 +87,7 @@ class AssembledElastic(AssembledBody):
             places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
-        k = len(trace.nodes)
-        own = sp.csr_matrix((np.ones(k), (np.arange(k), trace.nodes)), trace.weights.shape)
-        traces, alone = (
-            tuple(_trace(weights, row, len(held)) for row in unknowns)
-            for weights in (trace.weights, own)
-        )
+        traces, alone = traces_of(trace, unknowns, len(held))
         return Surface(
             body.name,
             body.locations[:, trace.nodes],
@@ -102,7 +98,7 @@ class AssembledElastic(AssembledBody):
             traces,
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            alone if body.degree > 1 else None,
+            alone,
             self._mesh(name, held, curve),
         )
 
@@ -143,14 +139,22 @@ class AssembledElastic(AssembledBody):
         return condense(self.body, solver, entries)
 
 
-def _trace(weights: sp.csr_matrix, unknowns: np.ndarray, n: int) -> sp.csr_matrix:
-    """One component of the displacement of the contacts (k,) in terms of all n unknowns of a body,
-    by their rows of the weights of its nodes, which have the unknowns given.
+def traces_of(trace: Trace, unknowns: np.ndarray, n: int) -> tuple[Traces, Traces | None]:
+    """The displacement of the contacts (k,) in terms of all n unknowns of a body, component by
+    component, where its nodes have the unknowns (dim, nodes); and that of the nodes at the contacts
+    alone, None where it is the same.
     """
-    part = sp.coo_matrix(weights)
-    trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (len(weights.indptr) - 1, n))
-    trace.eliminate_zeros()
-    return trace
+    k = len(trace.nodes)
+    own = sp.csr_matrix((np.ones(k), (np.arange(k), trace.nodes)), trace.weights.shape)
+
+    def of(weights: sp.csr_matrix) -> Traces:
+        part = sp.coo_matrix(weights)
+        made = [sp.csr_matrix((part.data, (part.row, row[part.col])), (k, n)) for row in unknowns]
+        for each in made:
+            each.eliminate_zeros()
+        return tuple(made)
+
+    return of(trace.weights), of(own) if abs(trace.weights - own).max() else None
 
 
 def assemble_elastic(

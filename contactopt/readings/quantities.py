@@ -153,11 +153,8 @@ def _of_pair(
                 f" pressure and half-widths; name the pair, as in '{name}:{names[0]}', or ask for"
                 " the energy."
             )
-        if rest and rest not in names:
-            raise InputError(
-                f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are"
-                f" {', '.join(names)}."
-            )
+        if rest:
+            _check_pair(rest, scene)
         number = names.index(rest) if rest else 0
         return Quantity(
             name, lambda state: slopes(state, number), partial(_read_pair, read, number)
@@ -222,7 +219,9 @@ def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
 def _check_pair(name: str, scene: Scene) -> None:
     names = [pair.name for pair in scene.pairs]
     if name not in names:
-        raise InputError(f"there is no contact '{name}', only {', '.join(names)}.")
+        raise InputError(
+            f"there is no pair of surfaces {name!r}; the pairs are {', '.join(names)}."
+        )
 
 
 def _contacts(state: State, name: str) -> slice:

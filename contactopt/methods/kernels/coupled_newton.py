@@ -170,7 +170,7 @@ class CoupledSteps:
         self.best = np.inf
 
     def restart(self, first: float) -> None:
-        self.accuracy = Forcing(first, constants.COUPLED_LOOSEST, constants.COUPLED_TIGHTEST)
+        self.accuracy = Forcing(first, constants.LOOSEST, constants.COUPLED_TIGHTEST)
         self.idle = 0
 
     def begin(self, start: Iterate | None) -> State | None:
