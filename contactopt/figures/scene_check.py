@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.motions import kernel, whole_motions, work
+from contactopt.bodies.protocol import FreeMotions
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import count
 from contactopt.checks import overheard
@@ -127,9 +128,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     return SimpleNamespace(
         name=body.name,
         at_rest=np.zeros(len(R)),
-        motions=Z,
-        motion_names=names,
-        resultants=work(Z, body.load) + (mean @ Z).T @ body.plate_forces,
+        motions=FreeMotions(Z, names, work(Z, body.load) + (mean @ Z).T @ body.plate_forces),
     )
 
 
