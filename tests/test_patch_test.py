@@ -104,9 +104,9 @@ def test_a_slanted_surface_that_ends_on_rollers(law, degree, rise, shapes, cells
     result = run(scene, figures=(), tol=1e-11)
     assert result.solution.solved
     if law == "frictionless" or cells[0] != cells[1]:  # friction shares the force of the corner
-        assert np.abs(result.pressure - 1).max() < 1e-8
+        assert np.abs(result.pressure - 1).max() < 1e-6
     for fields in result.fields:
-        assert np.abs(fields.stress - [-1, -1, -0.6, 0]).max() < 1e-8
+        assert np.abs(fields.stress - [-1, -1, -0.6, 0]).max() < 1e-6
 
 
 @pytest.mark.parametrize("law", ["tied", "coulomb"])
