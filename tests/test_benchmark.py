@@ -18,6 +18,7 @@ from contactopt.benchmark.experiment import read_experiment
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import Shares, Worker
 from contactopt.benchmark.runs import MethodSpec, Run
+from contactopt.benchmark.sequences import certificate
 from contactopt.benchmark.store import COLUMNS, STATUSES, Store, lines
 from contactopt.cli import main
 
@@ -588,3 +589,51 @@ def test_a_worker_process_outlives_failures_that_leave_it_intact(tmp_path):
         pid = worker.solver.process.pid
         assert first["status"] == "refused" and first["fingerprint"]
         assert worker.run(task)["status"] == "refused" and worker.solver.process.pid == pid
+
+
+WARM = """
+from contactopt import natural_map_residual, solve
+from contactopt.benchmark import method
+
+@method
+def begins(problem, tol=1e-8, start=None):
+    if start is not None and natural_map_residual(problem, start) < 1e-8:
+        raise ValueError("the start is the answer already")
+    return solve(problem, "nsgs", tol=tol).reactions
+
+@method
+def cold_only(problem, tol=1e-8):
+    return solve(problem, "nsgs", tol=tol).reactions
+"""
+
+
+def test_a_sequence_is_one_row_from_cold_and_one_from_the_last_answers(tmp_path):
+    written(tmp_path, WARM, "warm.py")
+    table = run(
+        tmp_path,
+        """
+        name = "sequences"
+        plugins = ["warm.py"]
+        settings = [1e-6]
+        [[problems]]
+        family = "growing_friction"
+        of = "packing"
+        bodies = 6
+        steps = 4
+        warm = [false, true]
+        [[methods]]
+        method = ["proximal", "begins", "cold_only"]
+        """,
+    )
+    assert (table["states"] == 4).all()
+    rows = table.set_index(["method", "problem.warm"])
+    assert rows["success"].drop(("cold_only", True)).all()
+    assert rows.loc[("cold_only", True), "status"] == "refused"  # not applicable, no failure
+    assert "start" in rows.loc[("cold_only", True), "message"]
+    warm, cold = (rows.loc[("proximal", warm), "iterations"] for warm in (True, False))
+    assert warm <= cold
+    made = benchmark.store.answers(tmp_path / "out")
+    sequence = problems.FAMILIES["growing_friction"](of="packing", bodies=6, steps=4)
+    for key, residual in zip(table["key"], table["residual"]):
+        if np.isfinite(residual):
+            assert certificate(sequence, made[key], None) == pytest.approx(residual)

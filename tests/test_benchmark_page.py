@@ -3,10 +3,12 @@
 import re
 import shutil
 
+import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 
 from contactopt import InputError
+from contactopt.benchmark.ranking import points, ranking
 from contactopt.benchmark.report_page import refusals, report_campaign
 from contactopt.benchmark.store import load, save
 from contactopt.cli import main
@@ -38,9 +40,8 @@ def test_a_campaign_ends_with_a_page_of_all_its_runs(campaign):
         assert row["residual"] == pytest.approx(runs["residual"].max(), rel=1e-3)
         assert row["low"] <= row["cpu"] <= row["high"] and row["claimed"] == runs["claimed"].all()
     assert len(data["histories"]) == len(rows)
-    (leaders,) = data["leaders"]
-    means = [row["mean"] for row in leaders["rows"]]
-    assert means == sorted(means) and leaders["group"] == "all"
+    assert data["order"] == ranking(points(table), data["accuracies"][0])["method"].tolist()
+    assert np.all(data["takes"]) and data["ours"] == data["methods"]
 
 
 def test_the_page_needs_no_network_and_no_other_file(campaign):
@@ -68,8 +69,8 @@ def test_a_strangers_rows_join_with_their_own_card(campaign, tmp_path):
     (card,) = [card for card in data["cards"] if card["source"] == "theirs"]
     assert card["times divided by"] == pytest.approx(2.0, rel=1e-3)
     assert card["machine"] == "a machine of others" and card["runs"] == len(theirs)
-    means = {row["method"]: row["mean"] for row in data["leaders"][0]["rows"]}
-    assert means["auto (theirs)"] == pytest.approx(means["auto"], rel=1e-2)
+    times = dict(zip(data["methods"], np.array(data["times"][0], dtype=float).T))
+    np.testing.assert_allclose(times["auto (theirs)"], times["auto"], rtol=0.05)
     assert data["order"][0] == "mine"
     assert main(["report", "all", "--merge", str(tmp_path / "theirs.csv")]) == 2
 
@@ -116,6 +117,15 @@ def test_a_browser_sorts_and_filters_the_runs_and_follows_links(campaign):
             " row.children[{}].innerText)"
         )
         head = "[...document.querySelectorAll('#runs th button')].map((button) => button.innerText)"
+        made = ranking(points(load(campaign)), 1e-8).set_index("method")["mean"]
+        lead = "[...document.querySelectorAll('#leaders {}')].map((one) => one.innerText)"
+        titles, shown = (browser.ask(lead.format(part)) for part in ("th button", "tbody td"))
+        lines = [shown[i : i + len(titles)] for i in range(0, len(shown), len(titles))]
+        rows = [dict(zip(titles, line)) for line in lines]
+        means = {row["method"]: float(row["CPU [s]"]) for row in rows}
+        assert means == pytest.approx(made.to_dict(), rel=1e-2)
+        for picture in ("profile", "over-mu", "spread"):
+            assert browser.ask(f"document.querySelectorAll('#{picture} svg').length") == 1
         column = browser.ask(head).index("CPU [s]")
         browser.ask(f"document.querySelectorAll('#runs th button')[{column}].click()")
         times = [float(text) for text in browser.ask(cells.format(column))]
@@ -134,5 +144,10 @@ def test_a_browser_sorts_and_filters_the_runs_and_follows_links(campaign):
         browser.wait("location.hash.startsWith('#problem=')")
         assert browser.ask("document.getElementById('choose-problem').selectedIndex") == 1
         assert browser.ask("document.querySelectorAll('#speed circle').length") == 2
+        browser.ask(
+            "{const by = (key) => document.getElementById(`by-${key}`); by('dim').value = '2';"
+            " by('family').value = 'punch-2d'; by('family').dispatchEvent(new Event('change'))}"
+        )
+        assert "2 of 2" in browser.ask(lead.format("tbody tr"))[0]  # both filters count
         assert browser.ask("document.documentElement.scrollWidth <= window.innerWidth")
         assert not browser.faults

@@ -417,3 +417,23 @@ def test_an_experiment_without_figures_gets_the_usual_ones_and_an_optional_one_m
     assert main(["report", str(tmp_path / "out")]) == 0
     text = (tmp_path / "out" / "report.md").read_text()
     assert "some" in text and "none" not in text.partition("some")[0]
+
+
+def test_pandas_alone_recomputes_five_findings_of_the_report(capsys, monkeypatch):
+    page = (CAMPAIGNS.parent / "site" / "comparing.md").read_text()
+    (program,) = re.findall(r"```python\n(.*?)```", page, re.S)
+    monkeypatch.chdir(REPORTS.parent)
+    exec(program, {})
+    said, report = capsys.readouterr().out, (REPORTS / "small_tier" / "report.md").read_text()
+    solvers, alone, along = re.findall(r"(\d+) (?:solvers|problems|runs)", said)
+    assert f"{solvers} solvers on {alone} problems and on {along} runs" in report
+    for where, external, own in re.findall(r"(\d) dimensions.*?(\d+) and auto (\d+)", said):
+        place = {"2": "in the plane", "3": "in space"}[where]
+        (line,) = [text for text in report.splitlines() if f"problems {place} without" in text]
+        assert f"reach 1e-6 on {external}, " in line and f"`auto` on {own}." in line
+    for method, number in re.findall(r"^(\S.*?) +(\d+)$", said, re.M)[-5:]:
+        solved = re.search(rf"`{re.escape(method)}` (\d+) and (\d+), ", report)
+        assert solved is None or sum(map(int, solved.groups())) == int(number), method
+    middle, times, wall = map(float, re.findall(r"\d+\.\d+", said)[-3:])
+    assert f"takes {middle:.2g} ms in the median, {times:.2g} times" in report
+    assert f"of the calls is {wall:.2f}," in report

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 from conftest import one_contact
@@ -7,10 +5,7 @@ from conftest import one_contact
 from contactopt import (
     InputError,
     InterfaceProblem,
-    fclib,
     natural_map_residual,
-    reduce,
-    scenes,
     solve,
 )
 from contactopt.errors import BackendError
@@ -19,14 +14,6 @@ from contactopt.methods.cone import AcaryCadoux, Relaxation, cone_program
 from contactopt.problem import dimensionless
 from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative
 from contactopt.problem.laws.bilateral import Bilateral
-
-FCLIB = Path(__file__).parents[2] / "shared" / "fclib"
-FILES = [
-    "Box_Stacks-i0035-31-0",
-    "CubeH8",
-    "LMGC_100_PR_PerioBox-i00361-60-03000",
-    "local_problem_test",
-]
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -116,40 +103,10 @@ def test_acary_cadoux_takes_the_opening_back(dim):
     assert np.abs(u[solution.reactions[:, 0] > 1e-3, 0]).max() < 1e-8
 
 
-@pytest.mark.parametrize("bridge", ["clarabel", "cvxpy"])
-def test_a_problem_on_which_other_fixed_points_cycle(bridge):
-    """f = (-10, 1), mu = 1: Tresca and the alternating iteration cycle, this one does not."""
-    solution = solve(one_contact((-10.0, 1.0), 1.0), AcaryCadoux(bridge), tol=1e-10)
-    assert solution.solved
-    assert solution.reactions[0] == pytest.approx([6.4, -6.4], abs=1e-8)
-
-
 def test_one_of_three_solutions_is_found():
     """f = (.8, 1), mu = 1 has the solutions stick, slip and open; the relaxation of it sticks."""
     solution = solve(one_contact((0.8, 1.0), 1.0), AcaryCadoux(), tol=1e-12)
     assert solution.solved and solution.reactions[0] == pytest.approx([1.0, 0.8])
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_scenes(dim):
-    problem = reduce(scenes.flat_punch(dim, elements=3, mu=0.2))
-    solution, best = solve(problem, AcaryCadoux(), tol=1e-10), solve(problem, "auto", tol=1e-11)
-    assert solution.solved
-    assert np.allclose(solution.reactions, best.reactions, atol=1e-7 * np.abs(best.reactions).max())
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("bridge", ["clarabel", "cvxpy"])
-def test_without_friction(dim, bridge):
-    solution = solve(
-        reduce(scenes.flat_punch(dim, elements=3, mu=0.0)), AcaryCadoux(bridge), tol=1e-12
-    )
-    assert solution.solved and solution.iterations == 1 and not np.any(solution.reactions[:, 1:])
-
-
-def test_warm_start_from_the_answer_is_one_iteration(cube):
-    first = solve(cube, AcaryCadoux(), tol=1e-10)
-    assert solve(cube, AcaryCadoux(), tol=1e-9, start=first).iterations == 1
 
 
 def test_other_conic_backends_through_cvxpy():
@@ -187,11 +144,3 @@ def test_a_program_without_an_answer_is_a_status(bridge):
 def test_indefinite_compliance_is_refused():
     with pytest.raises(BackendError, match="semidefinite"):
         CoulombSOCP.using(np.diag([1.0, -1.0]), np.ones(1), np.zeros((2, 0)), np.zeros(0))
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_public_problems(name):
-    path = FCLIB / f"{name}.hdf5"
-    if not path.exists():
-        pytest.skip("the FCLib files are not here")
-    assert solve(fclib.read(path), AcaryCadoux(), max_iterations=50).solved

@@ -1,14 +1,17 @@
 """One contract for every method of the table."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import one_contact
 
 from contactopt import (
     InputError,
     InterfaceProblem,
     Status,
+    fclib,
     natural_map_residual,
     reduce,
     scenes,
@@ -66,6 +69,7 @@ def test_every_method_gives_the_certified_answer_or_says_why_not(name, problems)
         assert solution.solved, f"{label}: {solution.message} ({solution.residual:.1e})"
         size = np.abs(exact.reactions).max()
         assert np.allclose(solution.reactions, exact.reactions, rtol=0, atol=10 * tol * size), label
+        assert np.allclose(solution.multipliers, exact.multipliers, rtol=100 * tol), label
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -115,3 +119,69 @@ def test_indefinite_compliance_is_not_called_solved():
         assert solution.solved == (
             natural_map_residual(problem, solution.reactions, solution.multipliers) <= 1e-8
         )
+
+
+@pytest.mark.parametrize("name", ["alternating", "lagrangian", "nsgs", "tresca"])
+@pytest.mark.parametrize("relaxation", [0.0, 2.0, np.nan])
+def test_bad_relaxation(name, relaxation):
+    with pytest.raises(InputError, match="relaxation"):
+        find_method(name, relaxation=relaxation)
+
+
+NORMAL = [5.11864, 8.32203]
+CYCLES = {"alternating": NORMAL, "lagrangian": NORMAL, "tresca": [1.0, 14.5]}
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_a_known_cycle_is_recognised_and_relaxation_breaks_it(name):
+    """K = [[1, 1.5], [1.5, 4]], f = (-10, 1): the iteration goes between two normal forces, from
+    the friction coefficient K_tt / |K_tn| = 2 / 3 on.
+    """
+    problem = one_contact((-10.0, 1.0), 1.0)
+    last = solve(problem, name, max_iterations=2000)
+    before = solve(problem, name, max_iterations=last.iterations - 1)
+    assert last.status.label == "cycling" and not last.solved
+    forces = sorted(float(each.reactions[0, 0]) for each in (last, before))
+    assert forces == pytest.approx(CYCLES[name], abs=5e-3)  # where it was recognised
+    relaxed = solve(problem, name, relaxation=0.5)
+    assert relaxed.solved and relaxed.reactions[0] == pytest.approx([6.4, -6.4], abs=1e-6)
+    for mu in (0.6, 0.67):
+        found = solve(one_contact((-10.0, 1.0), mu), name, max_iterations=2000)
+        assert found.solved == (mu < 2 / 3)
+
+
+@pytest.mark.parametrize("name", sorted({*ALL} - {*CYCLES, *OTHER_LAW, *APPROXIMATE}))
+def test_other_methods_do_not_cycle_there(name):
+    found = solve(one_contact((-10.0, 1.0), 1.0), name, max_iterations=1000)
+    assert found.solved and found.reactions[0] == pytest.approx([6.4, -6.4], abs=1e-5)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("name", ["acary_cadoux", "alternating", "tresca"])
+def test_one_convex_program_is_enough_without_friction(name, dim):
+    problem = reduce(scenes.flat_punch(dim, elements=3, mu=0.0))
+    found = solve(problem, name, tol=1e-12)
+    assert found.solved and found.iterations == 1 and not np.any(found.reactions[:, 1:])
+
+
+@pytest.mark.parametrize("name", sorted({*ALL} - OTHER_LAW - APPROXIMATE))
+def test_a_plate_pressed_and_dragged(name):
+    """Six equal springs under 6 and a pull of 1 share both equally; lambda is the plate's motion,
+    -1 and 1/6.
+    """
+    V = np.tile(np.eye(2), (6, 1))
+    problem = InterfaceProblem(np.eye(12), np.zeros((6, 2)), 0.5, V, np.array([-6.0, 1.0]))
+    found = solve(problem, name, tol=1e-9, max_iterations=5000)
+    assert found.solved
+    assert np.allclose(found.reactions, [1.0, -1 / 6], atol=1e-7)
+    assert np.allclose(found.multipliers, [-1.0, 1 / 6], atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["acary_cadoux", "admm", "apg", "nsgs", "tresca"])
+@pytest.mark.parametrize("file", ["Box_Stacks", "CubeH8", "LMGC_100_PR_PerioBox"])
+def test_files_of_fclib(name, file):
+    found = sorted((Path(__file__).parents[2] / "shared" / "fclib").glob(f"{file}*.hdf5"))
+    if not found:
+        pytest.skip("the FCLib files are not here")
+    tol = 1e-6 if name == "nsgs" else 1e-8
+    assert solve(fclib.read(found[0]), name, tol=tol, max_iterations=2000).solved

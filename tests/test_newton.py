@@ -1,7 +1,5 @@
 """The default and what it is made of: Newton's method, the proximal loop, warm starts."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -20,30 +18,13 @@ from contactopt import (
 )
 from contactopt.benchmark.families.of_scenes import tangential
 from contactopt.benchmark.families.packings import rigid_bodies
-from contactopt.methods.auto import Auto
-from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.bonded import Bonded
 from contactopt.methods.kernels.semismooth import Equations, Factored, evaluated
 from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.problem import dimensionless
-from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes import make_scene
 
 SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("bilateral", [False, True])
-def test_derivative_of_the_coulomb_map_is_the_difference_quotient(dim, bilateral):
-    rng = np.random.default_rng(0)
-    y, mu = rng.normal(size=(60, dim)), rng.uniform(0, 2, 60)
-    law = (Bilateral if bilateral else Coulomb)(mu)
-    _, D = law.project(y)
-    for j in range(dim):
-        step = 1e-7 * np.eye(dim)[j]
-        quotient = (law.project(y + step)[0] - law.project(y - step)[0]) / 2e-7
-        assert np.allclose(D[:, :, j], quotient, atol=1e-6)
 
 
 @pytest.mark.parametrize("p", [0, 1])
@@ -206,27 +187,6 @@ def test_start_of_the_wrong_size_is_refused(punch, cube):
         solve(punch, start=solve(cube))
 
 
-def test_a_solution_is_its_own_start(punch):
-    solution = solve(punch, tol=1e-10)
-    assert solve(punch, tol=1e-9, start=solution).iterations == 1
-
-
-@pytest.mark.parametrize("method", ["auto", "newton", "proximal", "alternating"])
-def test_contacts_at_rest_open_or_frictionless(method):
-    for problem in (
-        InterfaceProblem(np.eye(4), np.zeros((2, 2)), 0.3),
-        InterfaceProblem(np.eye(6), np.ones((2, 3)), 0.3),
-        InterfaceProblem(np.eye(6), -np.ones((2, 3)), 0.0),
-    ):
-        assert solve(problem, method, tol=1e-12).solved
-
-
-@dataclass(frozen=True)
-class Units:
-    force: float
-    length: float
-
-
 @settings(max_examples=25, deadline=None)
 @given(
     st.integers(0, 10**6),
@@ -270,19 +230,3 @@ def test_load_scales_the_answer_where_there_is_no_gap(factor):
     loaded = InterfaceProblem(base.Q, base.q, base.mu, base.V, base.s * factor)
     a, b = solve(base, tol=1e-11), solve(loaded, tol=1e-11)
     assert np.allclose(b.reactions / factor, a.reactions, atol=1e-8)
-
-
-def test_auto_leaves_newton_when_it_cycles(monkeypatch, without_sweeps):
-    """The chain: a Newton method that repeats itself is given up at the first repetition."""
-    problem, _ = dimensionless(rigid_bodies(6, 14, 0.7, seed=1))
-    wrong = np.ones(problem.q.shape)
-    monkeypatch.setattr(
-        "contactopt.methods.newton.Newton.with_residuals",
-        lambda self, p, s=None: iter([((wrong, np.zeros(0)), 1.0)] * 50),
-    )
-    points = []
-    for point in Auto().iterate(problem):
-        points.append(point)
-        if coulomb_equations(problem).evaluate(*point)[0] < 1e-9 or len(points) > 60:
-            break
-    assert sum(point[0] is wrong for point in points) == 2 and len(points) < 60

@@ -6,7 +6,7 @@ import pytest
 import scipy.sparse as sp
 from conftest import one_contact
 
-from contactopt import InputError, InterfaceProblem, Status, fclib, reduce, scenes, solve
+from contactopt import InterfaceProblem, Status, solve
 from contactopt.methods.kernels import gauss_seidel
 from contactopt.methods.kernels.gauss_seidel import Sweeps
 from contactopt.methods.nsgs import NSGS, Local
@@ -66,23 +66,6 @@ def test_one_contact_takes_one_sweep(force, expected):
     assert solution.reactions[0] == pytest.approx(expected, abs=1e-10)
 
 
-@pytest.mark.parametrize("scene", ["punch", "cube"])
-def test_it_finds_the_solution_of_the_default_method(scene, request):
-    problem = request.getfixturevalue(scene)
-    exact = solve(problem, tol=1e-12)
-    solution = solve(problem, NSGS(), tol=1e-9, max_iterations=1000)
-    assert solution.solved
-    assert np.allclose(solution.reactions, exact.reactions, atol=1e-6 * exact.reactions.max())
-    assert np.allclose(solution.multipliers, exact.multipliers, rtol=1e-6)
-
-
-@pytest.mark.parametrize("options", [{"mu": 0.0}, {"bilateral": True}, {"mu": 0.1}])
-def test_scenes(options):
-    assert solve(
-        reduce(scenes.flat_punch(2, elements=5, **options)), NSGS(), max_iterations=1000
-    ).solved
-
-
 @pytest.mark.parametrize("relaxation", [0.7, 1.4])
 def test_relaxation_changes_the_way_not_the_answer(relaxation, punch):
     plain, relaxed = (
@@ -109,19 +92,6 @@ def test_redundant_contacts():
         assert a.solved and natural_map_residual(problem, a.reactions) < 1e-9
     u = [problem.displacements(a.reactions, a.multipliers) for a in reactions]
     assert np.allclose(u[0], u[1], atol=1e-6)
-
-
-@pytest.mark.skipif(not LIBRARY.is_dir(), reason="the FCLib files are not here")
-@pytest.mark.parametrize("name", ["Box_Stacks", "CubeH8", "LMGC_100_PR_PerioBox"])
-def test_fclib(name):
-    problem = fclib.read(next(LIBRARY.glob(f"{name}*.hdf5")))
-    assert solve(problem, NSGS(), tol=1e-6, max_iterations=1500).solved
-
-
-@pytest.mark.parametrize("relaxation", [0.0, 2.0, np.nan])
-def test_bad_relaxation(relaxation):
-    with pytest.raises(InputError, match="relaxation"):
-        NSGS(relaxation)
 
 
 COMPILED = pytest.mark.skipif(

@@ -14,16 +14,18 @@ import scipy.sparse as sp
 from contactopt import all_solutions, fclib, natural_map_residual, solve
 from contactopt.benchmark import read_experiment, testset
 from contactopt.benchmark.problems import FAMILIES
+from contactopt.benchmark.sequences import Sequence, certificate, states_of
 from contactopt.benchmark.testset.programs import PROGRAMS, convex_program, write_cbf, write_npz
 from contactopt.benchmark.testset.tags import invariants
 from contactopt.cli import main
 from contactopt.errors import InputError
 from contactopt.problem import infeasibility
 
-ALL = testset.problems()
+SETS = {number: testset.problems(testset=number) for number in testset.SETS}
+ALL = [one for found in SETS.values() for one in found]
 SMALL = [one for one in ALL if one.tier == "small" and one.reference]
 UNSOLVABLE = [one for one in SMALL if not one.tags["feasible"]]
-SAMPLE = SMALL[:: max(1, len(SMALL) // 15)]
+SAMPLE = SMALL[:: max(1, len(SMALL) // 20)]
 
 
 def name(one):
@@ -39,13 +41,84 @@ def test_the_command_line_knows_all_tiers_programs_and_tags():
 
 
 def test_the_set_is_large_and_has_all_tiers_and_kinds():
-    assert len(ALL) >= 200
-    assert len({one.name for one in ALL}) == len(ALL)
-    assert {one.tier for one in ALL} == set(testset.TIERS)
-    for condition in ("dim=2", "dim=3", "symmetric=false", "feasible=false", "solutions>1"):
-        assert testset.problems("small", [condition]), condition
-    for form in ("dense", "sparse", "products"):
-        assert testset.problems("small", [f"form={form}"]), form
+    assert len({one.name for one in ALL}) == len(ALL)  # no problem is in both
+    for number, found in SETS.items():
+        assert len(found) >= 200
+        assert {one.tier for one in found} == set(testset.TIERS)
+        tags = ("dim=2", "dim=3", "symmetric=false", "feasible=false", "solutions>1")
+        for condition in (*tags, "form=dense", "form=sparse", "form=products"):
+            assert testset.problems("small", [condition], number), condition
+
+
+def test_most_of_set_2_has_no_plates_and_its_sequences_are_long():
+    alone = testset.problems("small", ["states=1", "feasible=true"])
+    assert sum(one.tags["motions"] == 0 for one in alone) >= 0.5 * len(alone)
+    sequences = [one for one in testset.problems("small") if one.tags["states"] > 1]
+    assert len(sequences) == 60 and all(20 <= one.tags["states"] <= 100 for one in sequences)
+    names = {one.name for one in sequences}
+    assert {name.replace("warm=False", "warm=True") for name in names} == {
+        name for name in names if "warm=True" in name
+    }
+
+
+def zeros_solve(one):
+    states = states_of(one.load())
+    return min(certificate(p, 0 * p.q, np.zeros(len(p.s))) for p in states) < 1e-2
+
+
+def test_zero_forces_solve_no_problem_of_a_sample_of_set_2():
+    assert not [one.name for one in testset.problems("small")[::25] if zeros_solve(one)]
+
+
+@pytest.mark.slow
+def test_zero_forces_solve_no_small_problem_of_set_2():
+    assert not [one.name for one in testset.problems("small") if zeros_solve(one)]
+
+
+def answers_along(sequence):
+    made, last = [], None
+    for state in sequence.states:
+        last = solve(state, tol=1e-11, start=last if sequence.warm else None)
+        made.append(last.reactions)
+    return made
+
+
+def test_slip_along_a_load_path_adds_up_to_the_motion_of_its_end():
+    given = {"of": "punch-3d", "elements": 3, "mu": 0.4}
+    path = FAMILIES["load_path"](steps=20, **given)
+    found = answers_along(path)
+    none = np.zeros(0)
+    slip = sum(p.displacements(r, none)[:, 1:] for p, r in zip(path.states, found))
+    end = FAMILIES["held"](**given)  # the plate is back where it only presses
+    np.testing.assert_allclose(slip, end.displacements(found[-1], none)[:, 1:], atol=1e-9)
+    alone = solve(end, tol=1e-11).reactions
+    assert np.linalg.norm(found[-1] - alone) > 0.05 * np.linalg.norm(alone)  # it has a history
+
+
+def test_a_packing_that_settles_moves_on_from_its_last_velocities():
+    given = {"dim": 2, "bodies": 9, "mu": 0.3}
+    sequence = FAMILIES["settling"](steps=6, warm=True, **given)
+    first = FAMILIES["packing"](**given)
+    np.testing.assert_allclose(sequence.states[0].q, first.q)
+    states, found = sequence.states, answers_along(sequence)
+    none = np.zeros(0)
+    u = [p.displacements(r, none) for p, r in zip(states, found)]
+    weight = [after.q[:, 1] - moved[:, 1] for after, moved in zip(states[1:], u)]
+    np.testing.assert_allclose(weight, np.tile(weight[0], (5, 1)), atol=1e-9)
+    assert min(moved[:, 0].min() for moved in u) > -1e-9  # nothing overlaps
+
+
+def test_a_sequence_is_judged_by_its_worst_state():
+    sequence = FAMILIES["growing_friction"](of="packing", bodies=9, steps=5)
+    assert isinstance(sequence, Sequence) and sequence.q.shape == (5 * sequence.contacts, 2)
+    assert [p.mu[0] for p in sequence.states] == pytest.approx([0.16, 0.32, 0.48, 0.64, 0.8])
+    found = answers_along(sequence)
+    assert certificate(sequence, np.concatenate(found), None) < 1e-10
+    found[3] = 1.1 * found[3]
+    worst = natural_map_residual(sequence.states[3], found[3])
+    assert certificate(sequence, np.concatenate(found), None) == worst > 1e-3
+    with pytest.raises(InputError, match="fit"):
+        certificate(sequence, found[0], None)
 
 
 def test_every_small_problem_has_a_reference():
@@ -57,7 +130,7 @@ def test_every_small_problem_has_a_reference():
         and max(one.reference["certificates"].values()) <= 1e-12
     ]
     assert len(confirmed) >= 0.9 * (len(SMALL) - len(UNSOLVABLE))
-    for one in SMALL:
+    for one in (*confirmed, *UNSOLVABLE):
         solved = "infeasible" if not one.tags["feasible"] else "solved"
         assert one.reference["auto"] == solved, one.name
 
@@ -81,8 +154,9 @@ def test_a_problem_made_anew_is_the_stored_one(one):
     for key, value in invariants(problem).items():
         assert value == pytest.approx(stored[key], rel=1e-6, abs=1e-9), key
     assert (problem.dim, problem.contacts) == (one.tags["dim"], one.tags["contacts"])
+    assert len(states_of(problem)) == one.tags.get("states", 1)
     unique = (one.tags["unique_below"] or 0) > one.tags["mu"]
-    if unique and "forces" in one.reference:
+    if unique and "forces" in one.reference and one.tags["states"] == 1:
         found = solve(problem, tol=1e-10)
         assert np.linalg.norm(found.reactions) == pytest.approx(one.reference["forces"], rel=1e-6)
 
@@ -234,16 +308,19 @@ def test_the_command_lists_shows_and_writes(tmp_path, capsys):
     pytest.importorskip("h5py")
     assert main(["problems", "list", "--tier", "small", "--tag", "dim=3"]) == 0
     assert "problems: " in capsys.readouterr().out
-    assert main(["problems", "show", "squeezed(size=2, mu=0.5)"]) == 0
+    assert main(["problems", "show", "squeezed(size=4, mu=0.5)"]) == 0
     assert "proof that there is no solution" in capsys.readouterr().out
-    assert main(["problems", "show", "springs(nodes=1, mu=1*"]) == 0
+    assert main(["problems", "show", "springs(nodes=1, mu=1*", "--testset", "1"]) == 0
     assert capsys.readouterr().out.count("solution ") == 3
     assert main(["problems", "write", "springs(nodes=2*", "--out", str(tmp_path)]) == 0
-    assert len(list(tmp_path.glob("*.hdf5"))) == 3
+    assert len(list(tmp_path.glob("*.hdf5"))) == 2
     assert fclib.read(next(tmp_path.glob("*.hdf5"))).contacts == 2
     options = ["--as", "cbf", "--program", "normal", "--out", str(tmp_path)]
     assert main(["problems", "write", "springs(nodes=2*", *options]) == 0
-    assert len(list(tmp_path.glob("*_normal.cbf"))) == 3
+    assert len(list(tmp_path.glob("*_normal.cbf"))) == 2
+    steps = "growing_friction(of=packing, dim=2*seed=7*cold*"
+    assert main(["problems", "write", steps.replace("cold", "False"), "--out", str(tmp_path)]) == 0
+    assert len(list(tmp_path.glob("growing*.hdf5"))) == 20
     capsys.readouterr()
     for wrong in (
         ["list", "nothing"],
@@ -294,6 +371,7 @@ def test_a_folder_of_files_joins_by_one_line(tmp_path):
 
 
 def test_the_stored_file_is_small_and_names_problems_of_the_set():
-    file = testset.problem_set.HERE / "set_1.json"
-    assert file.stat().st_size < 300_000
-    assert set(json.loads(file.read_text())) <= {one.name for one in ALL}
+    for number, found in SETS.items():
+        file = testset.problem_set.HERE / f"set_{number}.json"
+        assert file.stat().st_size < 300_000
+        assert set(json.loads(file.read_text())) <= {one.name for one in found}

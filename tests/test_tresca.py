@@ -1,9 +1,7 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import one_contact
 
 from contactopt import (
     InputError,
@@ -13,7 +11,6 @@ from contactopt import (
     Rigid,
     Scene,
     Support,
-    fclib,
     reduce,
     scenes,
     solve,
@@ -23,32 +20,6 @@ from contactopt.methods.tresca_iteration import Tresca, TrescaProblem
 from contactopt.problem import dimensionless
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
-
-CYCLING = (-10.0, 1.0)
-FCLIB = Path(__file__).parents[2] / "shared" / "fclib"
-
-
-def test_a_known_cycle_is_recognised_with_its_two_values():
-    """K = [[1, 1.5], [1.5, 4]], f = (-10, 1), mu = 1: the bounds 1 and 14.5 answer each other."""
-    problem = one_contact(CYCLING, 1.0)
-    solution = solve(problem, Tresca())
-    more = solve(problem, Tresca(), max_iterations=solution.iterations - 1)
-    assert solution.status.label == "cycling"
-    assert sorted([solution.reactions[0, 0], more.reactions[0, 0]]) == pytest.approx(
-        [1.0, 14.5], abs=1e-8
-    )
-
-
-def test_relaxation_breaks_the_cycle():
-    solution = solve(one_contact(CYCLING, 1.0), Tresca(relaxation=0.5), tol=1e-10)
-    assert solution.solved
-    assert solution.reactions[0] == pytest.approx([6.4, -6.4], abs=1e-8)
-
-
-@pytest.mark.parametrize("mu,converges", [(0.6, True), (0.67, False)])
-def test_contraction_threshold(mu, converges):
-    """The critical friction coefficient is K_tt / |K_tn| = 2/3."""
-    assert solve(one_contact(CYCLING, mu), Tresca(), max_iterations=2000).solved is converges
 
 
 @pytest.fixture(scope="module")
@@ -74,38 +45,6 @@ def test_too_much_friction_for_a_fixed_point_is_none_for_newton(dragged):
     assert solve(problem, Tresca(), max_iterations=200).status.label == "iteration_limit"
     assert solve(problem, Tresca(relaxation=0.5), max_iterations=200).solved
     assert solve(problem, "newton").solved
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("bilateral", [False, True])
-def test_same_answer_as_newton(dim, bilateral):
-    problem = reduce(
-        scenes.flat_punch(dim, elements=8 if dim == 2 else 3, mu=0.15, bilateral=bilateral)
-    )
-    ours, best = solve(problem, Tresca(), tol=1e-10), solve(problem, "auto", tol=1e-11)
-    assert ours.solved and best.solved and ours.iterations > 1
-    assert np.allclose(ours.reactions, best.reactions, atol=1e-7 * np.abs(best.reactions).max())
-    assert ours.multipliers == pytest.approx(best.multipliers, rel=1e-8)
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_without_friction_one_problem_is_enough(dim):
-    solution = solve(reduce(scenes.flat_punch(dim, elements=3, mu=0.0)), Tresca(), tol=1e-12)
-    assert solution.solved and solution.iterations == 1
-    assert not np.any(solution.reactions[:, 1:])
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_plate_dragged_sideways(dim):
-    base = reduce(scenes.flat_punch(dim, elements=3))
-    along = np.zeros((base.contacts, dim))
-    along[:, 1] = 1.0
-    V, s = np.column_stack([base.V, along.ravel()]), np.append(base.s, 0.3 * base.s)
-    problem = InterfaceProblem(base.Q, base.q, base.mu, V, s)
-    ours, best = solve(problem, Tresca()), solve(problem, "auto", tol=1e-11)
-    assert ours.solved
-    assert ours.reactions[:, 1].sum() == pytest.approx(-s[1], rel=1e-7)
-    assert ours.multipliers == pytest.approx(best.multipliers, rel=1e-6)
 
 
 @pytest.mark.parametrize("dim,backend", [(2, "clarabel"), (2, "osqp"), (3, "scs")])
@@ -135,27 +74,10 @@ def test_the_convex_problem_is_solved_to_rounding(cube, bilateral):
     assert np.allclose(r[:, 1:] * slip[:, None], -g[:, None] * u[:, 1:], atol=1e-11)
 
 
-def test_warm_start_from_the_answer_is_one_iteration(punch):
-    first = solve(punch, Tresca(), tol=1e-10)
-    assert solve(punch, Tresca(), tol=1e-9, start=first).iterations == 1
-
-
 def test_settings_are_checked():
-    with pytest.raises(InputError, match="relaxation"):
-        Tresca(relaxation=0.0)
     assert Tresca().backends(2) == ("proxqp", "proxqp") and Tresca().backends(3) == (
         "clarabel",
         "clarabel",
     )
     with pytest.raises(InputError, match="unknown conic backend 'proxqp'"):
         Tresca("proxqp").backends(3)
-
-
-@pytest.mark.parametrize(
-    "name", ["Box_Stacks-i0035-31-0", "CubeH8", "LMGC_100_PR_PerioBox-i00361-60-03000"]
-)
-def test_public_problems(name):
-    path = FCLIB / f"{name}.hdf5"
-    if not path.exists():
-        pytest.skip("the FCLib files are not here")
-    assert solve(fclib.read(path), Tresca(), max_iterations=50).solved

@@ -21,9 +21,10 @@ from contactopt.benchmark.keys import COLUMNS
 from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import Run
+from contactopt.benchmark.sequences import Sequence, certificate
 from contactopt.benchmark.store import ABSENT, SCHEMA, UNKNOWN, pack
 from contactopt.errors import InputError
-from contactopt.problem import InterfaceProblem, Status, natural_map_residual
+from contactopt.problem import InterfaceProblem, Status
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ def calibration() -> float:
     return min(seconds)
 
 
-def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, Any]:
+def judge(task: Task, problem: InterfaceProblem | Sequence, answer: Answer) -> dict[str, Any]:
     """The columns that follow from the answer, whose own word counts only as failure."""
     out: dict[str, Any] = {"message": answer.message, "time": _now(), **answer.measured}
     if answer.reactions is None:
@@ -138,7 +139,7 @@ def judge(task: Task, problem: InterfaceProblem, answer: Answer) -> dict[str, An
         "history": json.dumps(answer.history or []),
     }
     try:
-        residual = natural_map_residual(problem, r, lam)
+        residual = certificate(problem, r, lam)
     except InputError as error:
         return out | {"status": "error", "message": one_line(error)}
     out["residual"] = residual

@@ -17,10 +17,12 @@ from contactopt.benchmark import worker
 from contactopt.benchmark.pool import BUILD_LIMIT
 from contactopt.benchmark.problems import FAMILIES, ProblemSpec, named
 from contactopt.benchmark.process import Ended, Process, one_line
+from contactopt.benchmark.sequences import Sequence as States
+from contactopt.benchmark.sequences import certificate
 from contactopt.benchmark.store import ABSENT, answers, load
 from contactopt.errors import InputError
 from contactopt.files.toml_table import read_table
-from contactopt.problem import InterfaceProblem, natural_map_residual
+from contactopt.problem import InterfaceProblem
 from contactopt.scenes import SCENES
 
 if TYPE_CHECKING:
@@ -101,16 +103,14 @@ def _recomputed(
     return rows.drop(index=left_out).reset_index(drop=True), said
 
 
-def _certificate(problem: InterfaceProblem, answer: np.ndarray) -> float:
+def _certificate(problem: InterfaceProblem | States, answer: np.ndarray) -> float:
     r, lam = np.split(np.ravel(answer), [problem.q.size])
-    if r.size != problem.q.size:
-        raise InputError("the answer does not fit its problem")
-    return natural_map_residual(problem, r.reshape(problem.q.shape), lam if lam.size else None)
+    return certificate(problem, r, lam if lam.size else None)
 
 
 def _built(
     builder: Process, claim: list[str], files: dict[str, ProblemSpec]
-) -> InterfaceProblem | str:
+) -> InterfaceProblem | States | str:
     """The problem of a row, as CLAIMS, or why it cannot be built here."""
     label, name, parameters = claim
     try:

@@ -3,9 +3,10 @@
 A peer is a plug-in file with three functions that the other Python runs. They import what they
 need, and use no name from outside themselves. `version()` returns the version of the solver.
 `prepare(problem, tol, settings)` makes what the solver takes of the problem, a mapping of arrays:
-Q in rows of blocks (dim, dim), namely `indptr`, `indices` and `data`, and `q` (k, dim) and `mu`
-(k,). The normal component comes first. `solve(prepared)` returns the forces, whether the solver
-claims success, and its iterations. Only `solve` is timed.
+Q in rows of blocks (dim, dim), namely `indptr`, `indices` and `data`, `q` (k, dim), `mu` (k,), and
+`start` (k, dim), forces to begin with, zero from cold. The normal component comes first.
+`solve(prepared)` returns the forces, whether the solver claims success, and its iterations. Only
+`solve` is timed.
 """
 
 from __future__ import annotations
@@ -118,16 +119,22 @@ class Peer:
         tol: float,
         time_limit: float,
         dims: Collection[int] = (3,),
+        start: np.ndarray | None = None,
         **settings: Any,
     ) -> Answer:
         """Let the solver answer a problem without plates, which it gets without units.
 
         The tolerance is the solver's own [-], `time_limit` is in seconds, and `prepare` gets the
-        settings. `dims` are the dimensions that the solver takes, of 2 and 3: without 2, a problem
-        of the plane gets a second tangent along which nothing moves.
+        settings. `start` are forces (k, dim) to begin with. `dims` are the dimensions that the
+        solver takes, of 2 and 3: without 2, a problem of the plane gets a second tangent along
+        which nothing moves.
         """
         if len(problem.s):
             raise InputError(f"{self.name} knows no plates, whose forces balance a given load.")
+        law = problem.law
+        plain = law.unilateral and law.proportional and not law.dilatant
+        if not plain or law.stretch(problem.dim) is not None:
+            raise InputError(f"{self.name} knows Coulomb's law only, not {type(law).__name__}.")
         if problem.dim not in dims and 3 not in dims:
             raise InputError(f"this solver of {self.name} is one of the plane.")
         if not has_entries(problem.Q):
@@ -137,9 +144,12 @@ class Peer:
             p = _in_space(p)
         Q = sp.bsr_array(sp.csr_array(p.Q), blocksize=(p.dim, p.dim))
         Q.sort_indices()
+        begin = np.zeros(p.q.shape)
+        if start is not None:
+            begin[:, : problem.dim] = scales.to_dimensionless(start, problem.s)[0]
         arrays = {"indptr": Q.indptr, "indices": Q.indices, "data": Q.data}
         with tempfile.NamedTemporaryFile(suffix=".npz") as file:
-            np.savez(file, q=p.q, mu=p.mu, **arrays)
+            np.savez(file, q=p.q, mu=p.mu, start=begin, **arrays)
             file.flush()
             reply = self._ask([file.name, tol, time_limit, settings])
         if reply is None:

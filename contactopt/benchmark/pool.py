@@ -14,6 +14,7 @@ from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.benchmark.process import KILLED, START, Ended, Process, one_line
 from contactopt.benchmark.runs import Run
+from contactopt.benchmark.sequences import Sequence as States
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
@@ -42,7 +43,7 @@ class Worker:
     def __init__(self) -> None:
         self.builder, self.solver = Process(), Process()
         self.held = ""  # label of the problem that is held, with the columns that it fills
-        self.problem: InterfaceProblem
+        self.problem: InterfaceProblem | States
         self.facts: dict[str, Any]
         self.broken: dict[str, str] = {}  # problems that cannot be built -> how
 

@@ -13,6 +13,7 @@ from contactopt.benchmark.families.half_planes import half_plane
 from contactopt.benchmark.families.meshed_blocks import meshed_blocks
 from contactopt.benchmark.families.of_scenes import (
     by_products,
+    held,
     in_units,
     reduced,
     redundant,
@@ -22,8 +23,10 @@ from contactopt.benchmark.families.of_scenes import (
 )
 from contactopt.benchmark.families.packings import packing, rigid_bodies
 from contactopt.benchmark.families.rigid_blocks import rigid_blocks
+from contactopt.benchmark.families.sequences import growing_friction, load_path, settling
 from contactopt.benchmark.families.springs import springs
 from contactopt.benchmark.families.unsolvable import dragged, squeezed, toppled
+from contactopt.benchmark.sequences import Sequence
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
@@ -33,10 +36,11 @@ KINDS = ("scene", "fclib", "family")
 # families by name, one line for each file of contactopt.benchmark.families
 _RIGID = (rigid_bodies, packing, rigid_blocks)
 _ELASTIC = (half_plane, meshed_blocks, springs)
-_OF_SCENES = (by_products, tangential, redundant, in_units, skewed)
+_OF_SCENES = (by_products, held, tangential, redundant, in_units, skewed)
+_SEQUENCES = (load_path, growing_friction, settling)
 _UNSOLVABLE = (dragged, toppled, squeezed)
-FAMILIES: dict[str, Callable[..., InterfaceProblem]] = {
-    make.__name__: make for make in (*_RIGID, *_ELASTIC, *_OF_SCENES, *_UNSOLVABLE)
+FAMILIES: dict[str, Callable[..., Any]] = {
+    make.__name__: make for make in (*_RIGID, *_ELASTIC, *_OF_SCENES, *_SEQUENCES, *_UNSOLVABLE)
 }
 
 
@@ -75,8 +79,10 @@ class ProblemSpec:
             except TypeError as error:
                 raise InputError(f"family '{self.name}': {error}.") from error
 
-    def build(self, declared: Mapping[str, Callable[..., Any]]) -> InterfaceProblem:
-        """The problem; InputError on parameters that make none. `declared` as for `check`."""
+    def build(self, declared: Mapping[str, Callable[..., Any]]) -> InterfaceProblem | Sequence:
+        """The problem, or a sequence; InputError on parameters that make none. `declared` as for
+        `check`.
+        """
         if self.kind == "scene":
             return reduced(self.name, **self.parameters)
         if self.kind == "fclib":
@@ -84,7 +90,7 @@ class ProblemSpec:
 
             return read(self.path)
         problem = (FAMILIES | dict(declared))[self.name](**self.parameters)
-        if not isinstance(problem, InterfaceProblem):
+        if not isinstance(problem, InterfaceProblem | Sequence):
             raise InputError(
                 f"family '{self.name}' must return an InterfaceProblem; got"
                 f" {type(problem).__name__}."

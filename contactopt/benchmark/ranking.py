@@ -113,6 +113,7 @@ def points(table: pd.DataFrame) -> pd.DataFrame:
     groups = table.assign(_memory=memory, _refused=refused).groupby(POINT, sort=False)
     times = groups["cpu_seconds"]
     found = groups.agg(**joined)
+    found["bridge"] = groups["bridge_seconds"].median() if "bridge_seconds" in table else np.nan
     found = found.assign(low=times.quantile(0.25), high=times.quantile(0.75))
     elsewhere = (found["wall"] > np.maximum(BUSY * found["cpu"], NOISE)) & ~found["refused"]
     found["counted"] = found["cpu"].where(~elsewhere, found["wall"])
@@ -168,9 +169,11 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
     Compared are the problems that all these methods take. `mean` and `wall mean` are shifted
     geometric means (1 ms) of CPU and wall time [s] over those of them that somebody solved, a
-    failure counted at its limit. `rank` is that of `mean`; `best` and `worst` bound it in 95 % of
-    the bootstrap samples of the problems. `taken` problems out of `problems` are not refused by the
-    method. `over claim` is the median of the certificate over the tolerance of claimed successes.
+    failure counted at its limit. `bridge` is the median of the time [s] that the call of an
+    external solver takes besides the solver's own. `rank` is that of `mean`; `best` and `worst`
+    bound it in 95 % of the bootstrap samples of the problems. `taken` problems out of `problems`
+    are not refused by the method. `over claim` is the median of the certificate over the tolerance
+    of claimed successes.
     """
     import pandas as pd
 
@@ -188,6 +191,7 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
         "mean": means,
         "over the least": means / means.min(),
         "wall mean": wall,
+        "bridge": shared.groupby("method")["bridge"].median().reindex(methods),
         "memory": shared.groupby("method")["memory"].max().reindex(methods),
         "over claim": (claims["residual"] / claims["tolerance"]).groupby(claims["method"]).median(),
         "rank": means.rank(method="min", na_option="bottom").astype(int),
@@ -209,9 +213,12 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
         "takes": [f"{n} of {all_}" for n, all_ in zip(found["taken"], found["problems"])],
         "CPU [s]": found["mean"],
         "wall [s]": found["wall mean"],
+        "bridge [s]": found["bridge"],
         "memory [MB]": found["memory"],
         "certificate / asked": found["over claim"],
     }
+    if found["bridge"].isna().all():
+        del shown["bridge [s]"]
     if unranked(table):
         return found.assign(**shown)[list(shown)].sort_values("method", ignore_index=True)
     bounds = zip(found["rank"], found["best"], found["worst"])

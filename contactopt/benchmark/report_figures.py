@@ -30,6 +30,7 @@ from contactopt.figures.style import (
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 ACCURACIES = 1e-2, 1e-11, 10  # certificates of `time_to_accuracy`: first, last, how many
 # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
@@ -277,7 +278,7 @@ def _grid(rows: pd.DataFrame, x: str, y: str, value: str) -> pd.DataFrame:
     )
 
 
-def _draw_map(ax: Any, grid: pd.DataFrame, norm: Any, beside: bool) -> Any:
+def _draw_map(ax: Axes, grid: pd.DataFrame, norm: Any, beside: bool) -> Any:
     """Draw one map, with less room if another stands beside it; its picture."""
     ax.set_facecolor("#cccccc")
     ax.patch.set(hatch="xx", edgecolor="#999999")
@@ -295,7 +296,7 @@ def _draw_map(ax: Any, grid: pd.DataFrame, norm: Any, beside: bool) -> Any:
     return mesh
 
 
-def _thresholds(ax: Any, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame) -> None:
+def _thresholds(ax: Axes, rows: pd.DataFrame, x: str, y: str, grid: pd.DataFrame) -> None:
     """Lines at the thresholds of friction, logarithmic between the cells' values."""
     if "problem.mu" not in (x, y):
         return
@@ -350,7 +351,7 @@ def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
     return " ".join(words)
 
 
-def write_numbers(ax: Any, grid: pd.DataFrame, norm: Any, size: float) -> None:
+def write_numbers(ax: Axes, grid: pd.DataFrame, norm: Any, size: float) -> None:
     """Write the numbers of a map in its cells, black on light colours and white on dark ones."""
     values = grid.to_numpy(float)
     if values.size > CELLS:

@@ -1,7 +1,7 @@
 """The report of one finished campaign: figures and tables for papers, and a page to look things up.
 
-The page begins with the leader table. It has a section for each solver and for each problem, which
-links lead to, and every run with its repeats in one row.
+The page ranks the solvers on the problems that its filters leave. It has a section for each solver
+and for each problem, which links lead to, and every run with its repeats in one row.
 """
 
 from __future__ import annotations
@@ -24,33 +24,34 @@ from contactopt.benchmark.experiment import Experiment, read_layout
 from contactopt.benchmark.merging import joined
 from contactopt.benchmark.ranking import (
     NOISE,
-    RESAMPLES,
     achieved,
     agreement,
-    comparable,
     factors,
     points,
     ranking,
     reruns,
+    taken,
     unranked,
     wall_over_cpu,
 )
 from contactopt.benchmark.reports import write_report
 from contactopt.benchmark.store import ABSENT, require
-from contactopt.benchmark.testset import problems
+from contactopt.benchmark.testset import SETS, problems
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, write_html
 from contactopt.figures.style import COLOURS
+from contactopt.methods import METHODS
 
 if TYPE_CHECKING:
     import pandas as pd
 
 PAGE = "report.html"
+RESAMPLES = 400  # bootstrap samples of the problems, drawn again with each change of a filter
 ACCURACIES = (1e-3, 1e-6, 1e-8)  # certificates at which methods are ranked
-LEAST_PROBLEMS = 4  # of a group that has a leader table of its own
 MOST_POINTS = 30  # of a curve of convergence
 COLUMNS_SHOWN = (
-    "tolerance", "residual", "claimed", "status", "cpu", "low", "high", "wall", "memory", "repeats",
+    "tolerance", "residual", "claimed", "status", "cpu", "low", "high", "wall", "bridge", "memory",
+    "repeats",
 )  # fmt: skip
 _log = logging.getLogger(__name__)
 PROTOCOL = (
@@ -105,7 +106,9 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
     """What the page shows of the runs."""
     found = points(table)
     names, methods = list(dict.fromkeys(table["problem"])), sorted(set(table["method"]))
-    of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in problems()}
+    takes = taken(found).reindex(index=names, columns=methods).fillna(True)
+    sets = (one for number in SETS for one in problems(testset=number))
+    of_set = {one.name: {"tier": one.tier, **one.known.get("tags", {})} for one in sets}
     tags = {name: _tags(rows.iloc[0], of_set) for name, rows in table.groupby("problem")}
     accuracies = _accuracies(found)
     times = [achieved(found, a).reindex(names)[methods] for a in accuracies]
@@ -124,22 +127,15 @@ def page_data(table: pd.DataFrame) -> dict[str, Any]:
         "points": shown,
         "accuracies": accuracies,
         "times": [[[_plain(t) for t in row] for row in seconds.to_numpy()] for seconds in times],
-        "leaders": [
-            {
-                "group": group,
-                "accuracy": a,
-                "rows": _records(ranking(rows, a)),
-                "problems": members,
-                "compared": sorted({number[name] for name in comparable(rows)["problem"]}),
-            }
-            for group, rows, members in _groups(found, tags, number)
-            for a in accuracies
-        ],
+        "takes": takes.to_numpy().astype(bool).tolist(),
+        "limits": [_plain(t) for t in found.groupby("problem")["limit"].max().reindex(names)],
+        "ours": [name for name in methods if name.partition("(")[0] in METHODS],
         "histories": _histories(table, number, methods),
         "cards": _cards(table, divided),
         "busy": unranked(table),
         "protocol": PROTOCOL.format(noise=1e3 * NOISE, resamples=RESAMPLES, tau=_tau(table, found)),
-        "colours": COLOURS[:7],
+        "colours": COLOURS[:6],
+        "resamples": RESAMPLES,
     }
 
 
@@ -161,25 +157,10 @@ def _tau(own: pd.DataFrame, found: pd.DataFrame) -> str:
 def _tags(row: pd.Series, of_set: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     """What is known of a problem: some columns of its runs, and the tags of the test set."""
     own = {name: _plain(row[name]) for name in ("family", "dim", "contacts")}
-    own["plates"] = bool(row["plates"])
+    own |= {"plates": bool(row["plates"]), "mu": _plain(row.get("problem.mu", np.nan))}
+    warm = row.get("problem.warm")
+    own["sequence"] = "no" if warm not in (True, False) else "warm" if warm else "cold"
     return own | of_set.get(str(row["problem"]), {})
-
-
-def _groups(
-    found: pd.DataFrame, tags: dict[str, dict[str, Any]], number: dict[str, int]
-) -> list[tuple[str, pd.DataFrame, list[int]]]:
-    """The groups with a leader table, all and those of a tag, with their problems' numbers."""
-    groups = {"all": list(number)}
-    for name, known in tags.items():
-        for key, value in known.items():
-            if isinstance(value, str | bool) or key == "dim":
-                word = str(value).lower() if isinstance(value, bool) else value
-                groups.setdefault(f"{key} = {word}", []).append(name)
-    return [
-        (group, found[found["problem"].isin(members)], [number[name] for name in members])
-        for group, members in sorted(groups.items(), key=lambda pair: (pair[0] != "all", pair[0]))
-        if group == "all" or LEAST_PROBLEMS <= len(members) < len(number)
-    ]
 
 
 def _histories(own: pd.DataFrame, number: dict[str, int], methods: list[str]) -> list[list[Any]]:
@@ -227,10 +208,6 @@ def _absent(rows: pd.DataFrame) -> list[tuple[str, str]]:
     there = set(rows.loc[rows["status"] != ABSENT, "method"])
     left = rows[(rows["status"] == ABSENT) & ~rows["method"].isin(there)]
     return list(dict.fromkeys(zip(left["method"], left["message"])))
-
-
-def _records(table: pd.DataFrame) -> list[dict[str, Any]]:
-    return [{key: _plain(v) for key, v in row.items()} for row in table.to_dict("records")]
 
 
 def _plain(value: Any) -> Any:

@@ -35,7 +35,8 @@ STATUSES = {status.label: status.sentence for status in Status} | ENDS
 TYPES = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}  # in a table
 REFERENCE = 1e-8  # largest residual of a reference solution
 UNKNOWN = {"int": 0, "str": "", "float": np.nan, "bool": False}  # what stands for no value yet
-LATER = ("error", "calibration")  # columns that load() works out, or that older rows do not have
+# columns that load() works out, or that older rows do not have
+LATER = "error", "calibration", "states", "bridge_seconds"
 ANSWERS = "answers.npz"  # beside the table
 ABSENT = "absent"  # status of the row of a method that is not there
 _log = logging.getLogger(__name__)
@@ -242,6 +243,8 @@ def load(path: str | Path, absent: bool = False) -> pd.DataFrame:
             table = _from_text(path)
         if len(table) and int(table["schema"].max()) > SCHEMA:
             raise InputError(f"'{path}' was written by a newer version; update contactopt.")
+        if "states" not in table:  # it is older than sequences
+            table = table.assign(states=1, bridge_seconds=np.nan)
         if not absent:
             table = table[table["status"] != ABSENT].reset_index(drop=True)
         for source, prefix in (("parameters", "problem"), ("settings", "method")):
@@ -300,7 +303,7 @@ def _of_their_kinds(table: pd.DataFrame, path: Path, word: str, first: int) -> p
 def _from_lines(path: Path) -> pd.DataFrame:
     import pandas as pd
 
-    rows = {row["key"]: row for row in lines(path)}  # one per run
+    rows = {row["key"]: {"states": 1} | row for row in lines(path)}  # one per run
     exact: dict[str, np.ndarray] = {}  # the best answer to each problem
     good = [row for row in rows.values() if row["residual"] <= REFERENCE and row.get("answer")]
     for row in sorted(good, key=lambda row: row["residual"]):

@@ -24,6 +24,8 @@ from contactopt.benchmark.peers import Answer
 from contactopt.benchmark.plugins import PASSED, Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
+from contactopt.benchmark.sequences import Sequence as States
+from contactopt.benchmark.sequences import states_of
 from contactopt.benchmark.store import STATUSES
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.operators import form, has_entries
@@ -35,6 +37,11 @@ from contactopt.problem.laws.coulomb import Coulomb
 MOST_ROWS = 3000  # components up to which a Q of products is made a matrix
 POINTS = 100  # of a history
 MB = 1e6
+Call = Callable[[InterfaceProblem, bool, float], Answer]
+# how what was measured of the states of a sequence is joined
+JOIN: dict[str, Callable[..., float]] = {
+    "call_seconds": sum, "cpu_seconds": sum, "peak_mb": max, "base_mb": max,
+}  # fmt: skip
 FAILURES = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
 
 
@@ -62,7 +69,7 @@ _kept = Kept()
 
 def build(
     spec: ProblemSpec, paths: tuple[str, ...], diagnosed: bool, memory_limit: float
-) -> tuple[InterfaceProblem, dict[str, Any]] | str:
+) -> tuple[InterfaceProblem | States, dict[str, Any]] | str:
     """A problem with the columns that it fills, or a sentence that says why there is none."""
     _limit_memory(memory_limit)
     try:
@@ -70,21 +77,24 @@ def build(
         begin = time.perf_counter()
         problem = spec.build(_kept.plugins.problems)
         seconds = time.perf_counter() - begin
-        if not has_entries(problem.Q) and problem.q.size <= MOST_ROWS:
-            problem = problem.explicit()
-        if form(problem.Q) in ("products", "bodies"):
-            raise InputError(
-                f"problem '{spec.label}' must have Q as a matrix or as a convolution above"
-                f" {MOST_ROWS} components; a benchmark hands it to other processes."
-            )
+        if isinstance(problem, InterfaceProblem):
+            if not has_entries(problem.Q) and problem.q.size <= MOST_ROWS:
+                problem = problem.explicit()
+            if form(problem.Q) in ("products", "bodies"):
+                raise InputError(
+                    f"problem '{spec.label}' must have Q as a matrix or as a convolution above"
+                    f" {MOST_ROWS} components; a benchmark hands it to other processes."
+                )
+        states = states_of(problem)
         facts = {
             "fingerprint": problem.fingerprint,
             "contacts": problem.contacts,
             "dim": problem.dim,
-            "plates": len(problem.s),
+            "plates": len(states[0].s),
+            "states": len(states),
             "build_seconds": seconds,
         }
-        return problem, facts | (_diagnosis(problem) if diagnosed else {})
+        return problem, facts | (_diagnosis(states[0]) if diagnosed else {})
     except (Exception, SystemExit) as error:
         return one_line(error)
 
@@ -102,10 +112,11 @@ def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
     }
 
 
-def hold(label: str, problem: InterfaceProblem, paths: tuple[str, ...]) -> None:
+def hold(label: str, problem: InterfaceProblem | States, paths: tuple[str, ...]) -> None:
     """Keep a problem and plug-ins for the runs that follow."""
     _kept.plugins.load(paths)
-    for part in (problem, problem.law, problem.Q):  # no run profits of what another one computed
+    parts = [part for state in states_of(problem) for part in (state, state.law, state.Q)]
+    for part in parts:  # no run profits of what another one computed
         known = getattr(part, "__dict__", {})
         for name in [n for n in known if isinstance(getattr(type(part), n, 0), cached_property)]:
             del known[name]
@@ -126,7 +137,7 @@ def execute(task: Task) -> Answer | None:
     return _measured(task, pickle.loads(_kept.problem))
 
 
-def _measured(task: Task, problem: InterfaceProblem) -> Answer:
+def _measured(task: Task, problem: InterfaceProblem | States) -> Answer:
     """Run a method: its answer, or how it failed, with what was measured."""
     _limit_memory(task.memory_limit)
     random.seed(task.seed)
@@ -136,7 +147,7 @@ def _measured(task: Task, problem: InterfaceProblem) -> Answer:
     try:
         call = _call(task)
         begin = [clock() for clock in CLOCKS]
-        answer = call(problem)
+        answer = _along(call, problem, task.time_limit)
     except (Exception, SystemExit, KeyboardInterrupt) as error:
         answer = Answer(_word(error), one_line(error))
     wall, cpu, ended = (clock() - start for clock, start in zip(CLOCKS, begin))
@@ -146,8 +157,9 @@ def _measured(task: Task, problem: InterfaceProblem) -> Answer:
     if os.getpid() != own:  # a copy of the true process, which a method forked and forgot
         os._exit(1)
     try:
-        if task.run.method.peer:  # it measures itself, in its own process
-            measured |= answer.measured
+        if answer.measured:  # a peer measures itself, in its own process
+            bridge = measured["call_seconds"] - answer.measured["call_seconds"]
+            measured |= answer.measured | {"bridge_seconds": bridge}
         if answer.reactions is not None:
             answer = _in_form(answer, problem, measured["call_seconds"])
     except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
@@ -162,8 +174,42 @@ def _word(error: BaseException) -> str:
     return next((word for kind, word in FAILURES.items() if isinstance(error, kind)), "error")
 
 
-def _call(task: Task) -> Callable[[InterfaceProblem], Answer]:
-    """A method ready to be called, which answers in whatever form. Its own errors pass through."""
+def _along(call: Call, problem: InterfaceProblem | States, limit: float) -> Answer:
+    """The answer of a method to a problem, or to one state of a sequence after the other: sums of
+    what was measured, or the first state without an answer.
+    """
+    if isinstance(problem, InterfaceProblem):
+        return call(problem, False, limit)
+    answers: list[Answer] = []
+    left = limit
+    for number, state in enumerate(problem.states, 1):
+        if left <= 0:
+            return Answer("time_limit", f"{number - 1} of {len(problem.states)} states in time")
+        begin = CLOCKS[0]()
+        answer = call(state, problem.warm and number > 1, left)
+        # the bridge to an external solver is not counted
+        left -= answer.measured.get("call_seconds", CLOCKS[0]() - begin)
+        answers.append(answer)
+        if answer.reactions is None:
+            return replace(answer, message=f"state {number}: {answer.message}", measured={})
+    worst = next((a for a in answers if a.status != Status.SOLVED.label), answers[-1])
+    parts = [(_real(a.reactions).ravel(), a.multipliers) for a in answers]
+    lam = [part for _, part in parts if part is not None]
+    return replace(
+        worst,
+        reactions=np.concatenate([r for r, _ in parts]),
+        multipliers=np.concatenate(lam) if len(lam) == len(parts) else None,
+        iterations=sum(a.iterations for a in answers),
+        seconds=sum(a.seconds for a in answers),
+        history=None,
+        measured={key: JOIN[key](a.measured[key] for a in answers) for key in worst.measured},
+    )
+
+
+def _call(task: Task) -> Call:
+    """A method ready to be called with a problem, whether it starts from the answer to its last
+    problem, and a limit of time; it answers in whatever form. Its own errors pass through.
+    """
     spec, usual = task.run.method, task.run.setting == "default"
     plugin = _kept.plugins.find(spec.name) if spec.foreign else None
     given: dict[str, Any] = {
@@ -179,8 +225,12 @@ def _call(task: Task) -> Callable[[InterfaceProblem], Answer]:
         if usual:
             del given["tol"]
 
-        def solved(problem: InterfaceProblem) -> Answer:
-            s = solve(problem, method, **given)
+        last: list[Solution] = []
+
+        def solved(problem: InterfaceProblem, warm: bool, limit: float) -> Answer:
+            start = last.pop() if warm else None
+            s = solve(problem, method, start=start, **given | {"time_limit": limit})
+            last[:] = [s]
             return _of_solution(s, s.method, s.seconds["solve"])
 
         return solved
@@ -188,7 +238,18 @@ def _call(task: Task) -> Callable[[InterfaceProblem], Answer]:
     passed = {name: given[name] for name in PASSED if name in wanted and name not in spec.settings}
     if usual and "tol" in passed and wanted["tol"].default is not inspect.Parameter.empty:
         del passed["tol"]
-    return lambda problem: _read(make(problem, **passed, **spec.settings), spec.label)
+    before: list[Any] = []
+
+    def read(problem: InterfaceProblem, warm: bool, limit: float) -> Answer:
+        if warm and "start" not in wanted:
+            raise InputError(f"method '{spec.name}' takes no 'start', the forces to begin with.")
+        more = {"start": before.pop()} if warm else {}
+        more |= {"time_limit": limit} if "time_limit" in passed else {}
+        answer = _read(make(problem, **{**passed, **spec.settings, **more}), spec.label)
+        before[:] = [answer.reactions]
+        return answer
+
+    return read
 
 
 def _read(answer: Any, label: str) -> Answer:
@@ -206,7 +267,7 @@ def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Answer:
     return Answer(s.status.label, s.message, *forces, label, s.iterations, seconds, s.history)
 
 
-def _in_form(answer: Answer, problem: InterfaceProblem, seconds: float) -> Answer:
+def _in_form(answer: Answer, problem: InterfaceProblem | States, seconds: float) -> Answer:
     """The answer in its one form; TypeError or ValueError if it has another."""
     r = _real(answer.reactions)
     lam = None if answer.multipliers is None else _real(answer.multipliers)

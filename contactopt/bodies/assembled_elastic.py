@@ -127,7 +127,7 @@ class AssembledElastic(AssembledBody):
         planes = []
         for support in self.part.supports:
             given = support.displacement or {}
-            if list(given.values()) != [0.0]:
+            if list(given.values()) != [0.0] or support.boundary not in mesh.boundaries:
                 continue
             axis = body.kind.components.index(next(iter(given)))
             nodes = mesh.facets[:, np.asarray(mesh.boundaries[support.boundary])]

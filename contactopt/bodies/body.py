@@ -8,6 +8,7 @@ are those of the whole body.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 import skfem
@@ -154,7 +155,7 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
             f" {mesh.p[0].min():g}."
         )
     known = mesh.boundaries or {}
-    names = [*scene.surfaces_of(part), *(s.boundary for s in part.supports)]
+    names = [*scene.surfaces_of(part), *(name for s in part.supports for name in s.faces(known))]
     names += [load.boundary for load in part.loads if load.boundary]
     filled = sorted(boundary for boundary, facets in known.items() if len(facets))
     for name in names:
@@ -323,7 +324,13 @@ class _Constraints:
             if values is None:
                 values = dict.fromkeys(self.scene.components, 0.0)
             for component, value in values.items():
-                where = self.unknowns(support.boundary, component)
+                faces = support.faces(self.basis.mesh.boundaries)
+                where = reduce(np.intersect1d, (self.unknowns(f, component) for f in faces))
+                if not len(where):
+                    raise InputError(
+                        f"body '{self.part.name}': the boundaries of the support on"
+                        f" {support.boundary!r} share no node; name boundaries that meet."
+                    )
                 if np.any(self.held[where] & (self.prescribed[where] != value)):
                     raise InputError(
                         f"body '{self.part.name}': the support on {support.boundary!r} prescribes"

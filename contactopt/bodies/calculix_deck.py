@@ -1,11 +1,17 @@
 """Input decks of CalculiX (ccx), so that anyone can check a scene with another code.
 
-A deck has the nodes, elements, supports, plates and loads of our assembled bodies. Linear elements
-in ccx are CPE3 and CPE4 in plane strain, C3D4 and C3D8 in space, with full integration and no
-incompatible modes, as here. The axisymmetric ones are wedges of two degrees, which are not our
-elements, and no deck is written with them. Tractions and body forces become the nodal forces f
-that we use. The nodes of a plate move together by equations, and its total force acts on one of
-them. A half model carries half of the force: ccx knows nothing of `copies`.
+A deck has the nodes, elements, supports, plates and loads of our assembled bodies. CPE3, CPE4 and
+CPE6 in plane strain and C3D4, C3D8 and C3D10 with straight edges in space are our elements: without
+contact, displacements agree to the seven digits that ccx prints. Its quadratic quadrilaterals and
+hexahedra have no nodes in their middle, and no deck is written with them. Those in plane stress are
+solids, and differ from ours by the thickness. Axisymmetric ones are wedges of two degrees:
+displacements of CAX4 differ by 1e-4, those of CAX3 and CAX6, which have fewer points of integration
+than ours, by 2e-2 and 4e-4 on a coarse mesh and by a third of that on one with half the size
+(tests/test_calculix_deck.py). The forces that ccx prints there are those of a wedge.
+
+Tractions and body forces become the nodal forces f that we use. The nodes of a plate move together
+by equations, and its total force acts on one of them. A half model carries half of the force: ccx
+knows nothing of `copies`.
 
 Contact in ccx is a penalty: pressure = K overclosure, and stick with the slope K / 10, which the
 manual advises. K = factor E / h, with h the mean size of the slave's faces and E the smaller
@@ -30,20 +36,21 @@ from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.assembly import Assembly
 from contactopt.checks import check_number
 from contactopt.errors import InputError
-from contactopt.meshes.cells import elements_of
+from contactopt.meshes.cells import elements_of, second_order
 from contactopt.meshes.inp_elements import FACES
 from contactopt.problem.laws import find_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
 FACTOR = 100.0
+WEDGES = 180  # of two degrees make a ring
 LEAST = 0.001  # increment of the load at which ccx gives up; the first is the whole load
 SMOOTH = 0.7  # cosine of the angle up to which a face beside the contact boundary goes on with it
 
 
 def deck(scene: Scene, factor: float = FACTOR) -> str:
-    """A scene of elastic bodies with linear elements, under Coulomb's law with one number mu, as an
-    input deck that ccx runs unchanged; the contacts are as stiff as `factor`, in units of E / h.
+    """A scene of elastic bodies under Coulomb's law with one number mu, as an input deck that ccx
+    runs unchanged; the contacts are as stiff as `factor`, in units of E / h.
 
     ccx prints the displacements of all nodes, U, and the forces of supports, plates and loads on
     them, RF, into its .dat file. InputError for what a deck cannot say.
@@ -56,7 +63,10 @@ def deck(scene: Scene, factor: float = FACTOR) -> str:
         assert isinstance(made, AssembledElastic)
         bodies.append(_Numbered(made.body, scene, bodies[-1].after if bodies else (0, 0)))
     named = {body.name: body for body in bodies}
-    lines = [f"** {scene.name}, written by contactopt", "*NODE, NSET=NODES"]
+    lines = [f"** {scene.name}, written by contactopt"]
+    if scene.analysis.revolved:
+        lines += [f"** ccx prints the forces of a wedge, 1/{WEDGES} of those of the ring"]
+    lines += ["*NODE, NSET=NODES"]
     for step in (_Numbered.nodes, _Numbered.elements, _Numbered.held, _Numbered.plates):
         for body in bodies:
             lines += step(body)
@@ -77,13 +87,14 @@ def _check(scene: Scene) -> None:
                 f"body '{part.name}' has no mesh, and a deck of CalculiX needs one; make it a Part,"
                 " stiff where it is rigid."
             )
-    if not scene.analysis.deck:
-        raise InputError(
-            "CalculiX has other axisymmetric elements, and would not solve this scene; export a"
-            " scene in the plane or in space."
-        )
-    if scene.degree != 1:
-        raise InputError("a deck of CalculiX is written with linear elements; give degree = 1.")
+    for part in scene.meshed.values():
+        shape = part.build_mesh(scene.elements, scene.zone).refdom.__name__
+        if scene.degree == 2 and shape not in ("RefTri", "RefTet"):
+            raise InputError(
+                f"body '{part.name}': quadratic quadrilaterals and hexahedra of CalculiX have no"
+                " nodes in their middle, and are not those of this scene; give degree = 1, or a"
+                " mesh of triangles or tetrahedra."
+            )
     for pair in scene.pairs:
         if not find_law(pair.law).plain_coulomb() or callable(pair.mu) or np.ndim(pair.mu) > 0:
             raise InputError(
@@ -99,11 +110,13 @@ class _Numbered:
 
     def __init__(self, body: Assembly, scene: Scene, before: tuple[int, int]):
         mesh = body.basis.mesh
+        if scene.degree == 2:
+            mesh = second_order(mesh, body.locations)
         self.body, self.name, self.scene, self.mesh = body, body.name, scene, mesh
         self.first_node, self.first_element = before
         self.after = before[0] + mesh.p.shape[1], before[1] + mesh.t.shape[1]
         self.kind, cells = elements_of(mesh)
-        self.cells = cells.T
+        self.kind, self.cells = self.kind.rstrip("0123456789"), cells.T
 
     def nodes(self) -> Iterator[str]:
         for number, x in enumerate(self.mesh.p.T, self.first_node + 1):
@@ -118,7 +131,7 @@ class _Numbered:
         constants = f"{_number(material.E)}, {_number(material.nu)}"
         yield f"*MATERIAL, NAME={name}\n*ELASTIC\n{constants}"
         yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"
-        if self.scene.dim == 2:
+        if self.scene.dim == 2 and not self.scene.analysis.revolved:
             yield _number(self.scene.thickness)
 
     def _places(self, mask: np.ndarray) -> Iterator[tuple[str, int]]:

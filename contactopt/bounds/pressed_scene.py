@@ -277,6 +277,11 @@ class PressedScene:
                 moments[own] += size * np.asarray(load.value, dtype=float)
             elif loaded:
                 force += np.asarray(load.value, dtype=float)
+        for support in part.supports:
+            if support.boundary not in mesh.boundaries:
+                raise InputError(
+                    f"body '{part.name}': a bound knows no support at a point or edge."
+                )
         for boundary, names in holding:
             for name in components if names is None else names:
                 held[np.asarray(mesh.boundaries[boundary]), components.index(name)] = True

@@ -46,7 +46,9 @@ def _fits(name: str, pattern: str) -> bool:
 def _list(found: list[Problem], options: argparse.Namespace) -> None:
     for one in found:
         stored = one.known.get("tags", {})
-        words = [f"{key}={stored[key]}" for key in ("dim", "contacts", "form") if key in stored]
+        words = [
+            f"{key}={stored[key]}" for key in ("dim", "contacts", "states", "form") if key in stored
+        ]
         words += ["unsymmetric"] if stored.get("symmetric") is False else []
         words += ["no solution"] if stored.get("feasible") is False else []
         print(f"{one.tier:7}{one.name:74} {' '.join(words)}".rstrip())
@@ -66,13 +68,15 @@ def _show(found: list[Problem], options: argparse.Namespace) -> None:
 
 def _print_solutions(one: Problem) -> None:
     """All solutions of a small problem that has several, or the proof that there is none."""
+    from contactopt.benchmark.sequences import states_of
+
     tags = one.tags
     if not tags["feasible"]:
-        _print_proof(one.load())
+        _print_proof(states_of(one.load())[-1])
     elif (tags.get("solutions") or 0) > 1 and tags["contacts"] <= SHOWN:
         from contactopt.methods.enumeration import all_solutions
 
-        for number, solution in enumerate(all_solutions(one.load()), 1):
+        for number, solution in enumerate(all_solutions(states_of(one.load())[0]), 1):
             forces = np.array2string(solution.reactions.ravel(), precision=6, suppress_small=True)
             print(f"solution {number}: forces {forces}, certificate {solution.residual:.1e}")
 
@@ -108,24 +112,28 @@ def _write(found: list[Problem], options: argparse.Namespace) -> None:
 def _written(one: Problem, stem: Path, form: str, kinds: list[str] | None) -> Iterator[Path]:
     """The files of one problem, written."""
     from contactopt import fclib
+    from contactopt.benchmark.sequences import states_of
     from contactopt.benchmark.testset import programs
     from contactopt.methods.driver import solve
 
-    problem, writers = one.load(), {"npz": programs.write_npz, "cbf": programs.write_cbf}
-    if form == "fclib":
-        path = stem.with_name(f"{stem.name}.hdf5")
-        fclib.write(problem.explicit(), path, one.name)
-        yield path
-        return
-    answer = solve(problem, tol=TOL)
-    if not answer.solved:
-        raise InputError(f"it was not solved ({answer.status}).")
-    for kind in kinds or programs.PROGRAMS:
-        if form == "npz" and problem.dim == 3 and kind != "normal" and not kinds:
-            continue  # no quadratic program
-        path = stem.with_name(f"{stem.name}_{kind}.{form}")
-        writers[form](programs.convex_program(problem, kind, answer.reactions), path)
-        yield path
+    states = states_of(one.load())
+    writers = {"npz": programs.write_npz, "cbf": programs.write_cbf}
+    for number, problem in enumerate(states, 1):  # a file for each state of a sequence
+        name = stem.name + (f"_{number:03}" if len(states) > 1 else "")
+        if form == "fclib":
+            path = stem.with_name(f"{name}.hdf5")
+            fclib.write(problem.explicit(), path, one.name)
+            yield path
+            continue
+        answer = solve(problem, tol=TOL)
+        if not answer.solved:
+            raise InputError(f"it was not solved ({answer.status}).")
+        for kind in kinds or programs.PROGRAMS:
+            if form == "npz" and problem.dim == 3 and kind != "normal" and not kinds:
+                continue  # no quadratic program
+            path = stem.with_name(f"{name}_{kind}.{form}")
+            writers[form](programs.convex_program(problem, kind, answer.reactions), path)
+            yield path
 
 
 ACTIONS = {"list": _list, "show": _show, "write": _write}

@@ -2,7 +2,7 @@
 
 A way is a form of Q and a solver of the bodies: a dense Q, products with Q by factors, or bodies
 and contact at once by multigrid. COSTS were fitted to times on meshes that nobody prepared, and
-`python -m experiments.questions.ways` judges the choice by other ones (reports/ways/report.md).
+`python -m experiments.questions.scene_check` compares them with runs of other scenes.
 MOST_EXPLICIT and AGAIN are not fitted but chosen: an array of half a gigabyte, and a coupled way
 that takes less than half the time of factors.
 """

@@ -147,7 +147,13 @@ class Sensitivity:
         return self.problem.law.project_by_parameter(self._point)
 
     def forward(
-        self, *, q: Any = None, mu: Any = None, s: Any = None, Q: Any = None, V: Any = None
+        self,
+        *,
+        q: ArrayLike | None = None,
+        mu: ArrayLike | None = None,
+        s: ArrayLike | None = None,
+        Q: Any = None,
+        V: ArrayLike | None = None,
     ) -> Change:
         """The change of the solution along a direction of q (k, dim), mu (k,) or a number, s (p,),
         Q (array, sparse or operator) and V; one-sided where contacts are weakly active. InputError
@@ -189,7 +195,11 @@ class Sensitivity:
         return Onesided(*place, self.distance * self.force, self.force, response)
 
     def adjoint(
-        self, *, reactions: Any = None, multipliers: Any = None, displacements: Any = None
+        self,
+        *,
+        reactions: ArrayLike | None = None,
+        multipliers: ArrayLike | None = None,
+        displacements: ArrayLike | None = None,
     ) -> Dual:
         """The gradient by all data of f(r, lambda, u) with the derivatives `reactions` (k, dim),
         `multipliers` (p,) and `displacements` (k, dim), from one transposed solve. Where contacts
@@ -281,7 +291,7 @@ def told_apart(residual: float) -> float:
     return max(NEAR, ROUNDING * residual)
 
 
-def _given(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
+def _given(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> np.ndarray:
     """The array of that shape; zeros if there is none, and one number fills it."""
     if value is None:
         return np.zeros(shape)

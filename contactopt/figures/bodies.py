@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from contactopt.meshes.cells import elements_of
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 ELEVATION, AZIMUTH = 22.0, -130.0  # degrees, from where solids are seen
 PIXELS = 800  # of the longer side of the picture of solids, more than it takes in a PNG file
 
@@ -36,7 +39,7 @@ def deformed(
     scene: Scene,
     problem: InterfaceProblem,
     fields: Sequence[Fields],
-    ax: Any = None,
+    ax: Axes | None = None,
     couplings: Sequence[Coupling] = (),
 ) -> Any:
     """Draw the deformed bodies, coloured by von Mises stress and mirrored to the whole section.
@@ -98,7 +101,7 @@ def _draw_section(
     fields: Sequence[Fields],
     scale: float,
     top: float,
-    ax: Any,
+    ax: Axes,
     plane: tuple[int, float] | None,
 ) -> Any:
     from matplotlib.collections import LineCollection
@@ -148,7 +151,7 @@ def _reach(scene: Scene, fields: Sequence[Fields]) -> float | None:
     return 4 * half_width if half_width is not None and large and scene.dim == 2 else None
 
 
-def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Any) -> Any:
+def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float, ax: Axes) -> Any:
     """The surfaces of all bodies with a depth buffer: nearer ones hide those behind them."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -24,7 +25,7 @@ from contactopt.figures.scene_check import SceneCheck
 from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
-from contactopt.scenes.scene import Part, Scene
+from contactopt.scenes.scene import Part, Scene, Support
 
 ROLES = ("no use", "support", "load", "plate", "bolt", "contact")
 NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundary that stay legible
@@ -207,6 +208,7 @@ def _boundaries(
     """
     held = {support.boundary: support.displacement for support in part.supports}
     centre = _spatial(mesh.p.mean(axis=1, keepdims=True))[0]
+    size = float(np.ptp(mesh.p, axis=1).max())
     loads = {load.boundary: load for load in part.loads}
     for name, item in _sides(mesh):
         load = loads.get(name)
@@ -222,18 +224,25 @@ def _boundaries(
             mean = n.mean(axis=1) / np.linalg.norm(n.mean(axis=1))
             vector[middle, : scene.dim] = load.resultant(scene.components, mean)
             item["marked"] = np.arange(len(places)) == middle
-        size = float(np.ptp(mesh.p, axis=1).max())
         if any(np.ptp(places[:, a]) <= 1e-9 * size >= abs(places[0, a] - x) for a, x in planes):
             item["hidden"] = True
         if role == 1:
-            axes = np.array([c in (held[name] or scene.components) for c in scene.components])
-            if axes.all():  # one symbol, across the boundary
-                axes = 2.0 * (
-                    np.arange(scene.dim) == np.argmin(np.ptp(places, axis=0)[: scene.dim])
-                )
-            outward = np.where(places.mean(axis=0) > centre + 1e-6 * size, 1.0, -1.0)
-            item["held"] = np.tile(outward * np.pad(axes, (0, 3 - scene.dim)), (len(places), 1))
+            item["held"] = _held(scene, held[name], places, centre, size)
         yield item | {"name": f"{part.name}: {name} ({ROLES[role]})", "role": role}
+    for name in held:
+        faces = Support(name).faces(mesh.boundaries)
+        if len(faces) > 1:
+            each = (facet_nodes(mesh, np.asarray(mesh.boundaries[face])) for face in faces)
+            places = _spatial(mesh.doflocs[:, reduce(np.intersect1d, each)])
+            yield {
+                "name": f"{part.name}: {name} ({ROLES[1]})",
+                "places": places,
+                "cells": np.zeros((0, 3), dtype=int),
+                "role": 1,
+                "marked": _spread(places, SYMBOLS),
+                "vector": np.zeros(places.shape),
+                "held": _held(scene, held[name], places, centre, size),
+            }
     for load in part.loads:
         if not load.boundary:
             force = np.array(list(load.values(scene.components).values()))
@@ -244,6 +253,21 @@ def _boundaries(
                 "role": 2,
                 "vector": _spatial(force[:, None]),
             }
+
+
+def _held(
+    scene: Scene,
+    held: Mapping[str, float] | None,
+    places: np.ndarray,
+    centre: np.ndarray,
+    size: float,
+) -> np.ndarray:
+    """Symbols (k, 3) of a support at its places (k, 3), outwards along the axes that it holds."""
+    axes = np.array([c in (held or scene.components) for c in scene.components])
+    if axes.all():  # one symbol, across the boundary
+        axes = 2.0 * (np.arange(scene.dim) == np.argmin(np.ptp(places, axis=0)[: scene.dim]))
+    outward = np.where(places.mean(axis=0) > centre + 1e-6 * size, 1.0, -1.0)
+    return np.tile(outward * np.pad(axes, (0, 3 - scene.dim)), (len(places), 1))
 
 
 def _normals(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

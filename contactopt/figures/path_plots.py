@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,8 +20,11 @@ from contactopt.figures.style import (
 )
 from contactopt.solving.paths import PathResult
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-def loop(path: PathResult, ax: Any = None) -> Any:
+
+def loop(path: PathResult, ax: Axes | None = None) -> Any:
     """Shear force against shift where the path has a shear, else normal force against approach."""
     ax = make_axes(ax)
     x, y, labels = _loop(path)
@@ -33,7 +36,7 @@ def loop(path: PathResult, ax: Any = None) -> Any:
     return ax
 
 
-def energies(path: PathResult, ax: Any = None) -> Any:
+def energies(path: PathResult, ax: Axes | None = None) -> Any:
     """Work since the first state: lost, done by friction, and the error of the steps."""
     ax = make_axes(ax)
     since = {key: value - value[0] for key, value in path.history.items()}

@@ -36,6 +36,8 @@ from contactopt.readings.half_space_readings import surface_maps
 from contactopt.scenes.scene import Scene
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from contactopt.accuracy.estimate import Estimate
 
 __all__ = [
@@ -93,7 +95,9 @@ def _singular(scene: Scene) -> bool:
     return scene.reference is not None and scene.reference.peak is None
 
 
-def pressure(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
+def pressure(
+    scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Axes | None = None
+) -> Any:
     """Contact pressure over its mean, with the exact curve, against position, over the half-width
     where the zone lies about the origin.
     """
@@ -157,7 +161,9 @@ def _about_origin(
     return bool(abs(first + last) / 2 <= CENTRED * half_width and last - first <= 2.5 * half_width)
 
 
-def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
+def traction(
+    scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Axes | None = None
+) -> Any:
     """Tangential traction against position with the friction bound; stick and slip are marked."""
     ax, (length, stress) = make_axes(ax), scene.units
     if not _in_rows(problem):
@@ -194,7 +200,7 @@ def traction(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: An
     return ax
 
 
-def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str, ax: Any) -> Any:
+def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str, ax: Axes) -> Any:
     """Values (k,) of the contacts of a surface as colours over its chart."""
     x, y = problem.chart.places
     cells = problem.chart.cells
@@ -207,7 +213,7 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
     return ax
 
 
-def _plane(scene: Scene, problem: InterfaceProblem, ax: Any) -> None:
+def _plane(scene: Scene, problem: InterfaceProblem, ax: Axes) -> None:
     """Name the axes of a surface in 3D, which are x and y where it lies across z."""
     places, unit = problem.chart.places, scene.units[0]
     flat = np.allclose(places, problem.coordinates[:2], atol=STRAIGHT * np.ptp(places))
@@ -215,7 +221,9 @@ def _plane(scene: Scene, problem: InterfaceProblem, ax: Any) -> None:
     ax.set(xlabel=f"{first} [{unit}]", ylabel=f"{second} [{unit}]", aspect="equal")
 
 
-def stick_map(scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Any = None) -> Any:
+def stick_map(
+    scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Axes | None = None
+) -> Any:
     """Sticking, slipping and open nodes of a 3D contact, with the tangential traction as arrows, of
     which the longest is three times their distance.
     """
@@ -307,7 +315,7 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
     return figure
 
 
-def convergence(solutions: dict[str, Solution], ax: Any = None) -> Any:
+def convergence(solutions: dict[str, Solution], ax: Axes | None = None) -> Any:
     """Natural-map residual against outer iterations, one line per solve."""
     ax = make_axes(ax)
     for colour, (label, solution) in zip(cycle(COLOURS), solutions.items()):

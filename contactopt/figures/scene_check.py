@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.accuracy.proposal import accuracy_lines
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.bodies.motions import kernel, whole_motions, work
 from contactopt.bodies.protocol import FreeMotions
@@ -100,6 +101,7 @@ def check_scene(
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states; the last one is described")
     lines += _cost_lines(costs, memory, len(states))
+    lines += accuracy_lines(scene, made) if len(states) == 1 else []
     lines += [f"note: {note}" for note in notes]
     return SceneCheck(scene, made, free, costs, memory, tuple(notes), "\n".join(lines))
 
@@ -128,7 +130,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     return SimpleNamespace(
         name=body.name,
         at_rest=np.zeros(len(R)),
-        motions=FreeMotions(Z, names, work(Z, body.load) + (mean @ Z).T @ body.plate_forces),
+        motions=FreeMotions(Z, tuple(names), work(Z, body.load) + (mean @ Z).T @ body.plate_forces),
     )
 
 

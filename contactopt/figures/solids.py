@@ -8,9 +8,12 @@ small ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 LINE = 0.7  # half of the width of a mesh line [pixels]
 SPARSE = 6.0  # pixels, the least height of a triangle beside whose edges mesh lines are drawn
@@ -144,7 +147,7 @@ def _light(corners: np.ndarray) -> np.ndarray:
 
 
 def draw_frame(
-    ax: Any, view: np.ndarray, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
+    ax: Axes, view: np.ndarray, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
 ) -> None:
     """Three edges of the box between `low` and `high` (3,) as axes with ticks and labels, those
     that stand free of the bodies.

@@ -8,9 +8,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # of Okabe and Ito, legible to all; in place of their yellow, too light for a line, Tol's wine
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#882255")
@@ -53,7 +56,7 @@ def symbols(text: str) -> str:
     return re.sub(r"\bmu\b", r"$\\mu$", text)
 
 
-def make_axes(ax: Any) -> Any:
+def make_axes(ax: Axes) -> Any:
     """The axes that were given, or those of a new figure."""
     return paper_axes()[1][0] if ax is None else ax
 
@@ -78,7 +81,7 @@ def paper_axes(
     return figure, axes
 
 
-def dress(ax: Any, spines: bool = False, letters: float = LETTERS) -> None:
+def dress(ax: Axes, spines: bool = False, letters: float = LETTERS) -> None:
     """Give axes the letters, lines and colours of a paper; `spines` keeps those above and right."""
     sizes = {"color": COLOURS, "lw": [LINE] * len(COLOURS), "ms": [MARK] * len(COLOURS)}
     ax.set_prop_cycle(**sizes)
@@ -94,7 +97,7 @@ def dress(ax: Any, spines: bool = False, letters: float = LETTERS) -> None:
         spine.set_visible(spines or side not in ("top", "right"))
 
 
-def add_legend(ax: Any) -> None:
+def add_legend(ax: Axes) -> None:
     """A legend above our own axes, where it is off all lines, in as many columns as there is room
     for, and in other people's axes, which may have a title, where it is best; none for one line.
     """
@@ -119,7 +122,7 @@ def add_legend(ax: Any) -> None:
     ax.legend(fontsize=letters, labelspacing=0.2, **look, **where)
 
 
-def add_colours(drawn: Any, ax: Any, label: str, **room: Any) -> Any:
+def add_colours(drawn: Any, ax: Axes, label: str, **room: Any) -> Any:
     """The colour bar of what was drawn on axes, or on several."""
     first = np.ravel(ax)[0]
     bar = first.figure.colorbar(drawn, ax=ax, label=label, **({"shrink": 0.8} | room))
@@ -127,7 +130,7 @@ def add_colours(drawn: Any, ax: Any, label: str, **room: Any) -> Any:
     return bar
 
 
-def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
+def label_ends(ax: Axes, ends: Sequence[tuple[float, float, str, str]]) -> None:
     """Write coloured names beside the axes at the heights where lines end, (x, y, name, colour)
     each, apart as letters are high: the nearest places in the sum of squares (isotonic regression).
     A dotted line leads from a name to an end not beside it.
@@ -154,7 +157,7 @@ def label_ends(ax: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
 
 
 def draw_lines(
-    ax: Any,
+    ax: Axes,
     lines: Sequence[tuple[str, Sequence[float], Sequence[float]]],
     styles: Sequence[str] = (),
 ) -> None:

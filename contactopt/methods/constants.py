@@ -21,7 +21,7 @@ LOOK, MOMENT = 3e5, 1e8  # multiplications worth a certificate; between two look
 NEWTON_STEPS = 25  # of Newton's method, whose last ones converge quadratically
 PATIENCE = 6  # Newton steps without progress
 FEW_ENTRIES = 5000  # unknowns of an operator whose entries are asked for without progress
-PROGRESS = 0.9  # a residual that falls by less than this factor is no progress
+PROGRESS = 0.9  # a residual or error that falls by less than this factor is no progress
 MOST_STATES = {2: 100, 3: 10}  # contacts up to which it is tried, by the dimension
 TREE_WORK = 3e8  # on the tree over the states of the contacts at first, in its units: .5 s
 CONE_PROGRAMS = 5  # of the fixed point of Acary and Cadoux
@@ -64,7 +64,6 @@ SHARPEST = 1e-14  # and the finest accuracy that is asked of it
 FRICTIONLESS, ROUGHEST = 1e-4, 1e3  # friction below and above them counts as none and as this
 INTERIOR_STEPS = 60
 STALLED = 12  # steps without progress after which it ends
-INTERIOR_PROGRESS = 0.9  # an error that falls by less than this factor is no progress
 START = 100.0  # size of the first point in both cones, over dimensionless forces of order one
 LEAST_SMOOTHING, MOST_SMOOTHING = 0.03, 0.3  # of the friction of random paths
 PREDICTED = 0.99  # way of a predictor to the boundary of the cones
@@ -84,7 +83,7 @@ LAST_LOOSEST = 0.5  # bound of it
 # Newton's steps from products with Q (contactopt.methods.newton, contactopt.methods.kernels.krylov,
 # .linearised).
 KRYLOV_FIRST = 1e-2  # accuracy of the first step
-KRYLOV_LOOSEST, KRYLOV_TIGHTEST = 0.1, 1e-4  # bounds of the accuracy of the others
+LOOSEST, TIGHTEST = 0.1, 1e-4  # bounds of the accuracy of the others, and on nested grids
 PRODUCT_SHARE = 0.05  # accuracy of products, over that of the step
 MODEL_STEP = 1e-3  # accuracy of the same step for the model of Q, over that of the step
 MODEL_PRODUCTS = 1e-4  # accuracy of the products that make the model
@@ -97,14 +96,13 @@ WEIGHT_FALL, WEIGHT_RISE = 4.0, 8.0  # of the proximal weight after a step taken
 
 # Newton's steps on contact and bodies at once (contactopt.methods.kernels.coupled_newton).
 COUPLED_FIRST = 0.1  # accuracy of the bonded solution and of the first step
-COUPLED_LOOSEST, COUPLED_TIGHTEST = 0.1, 1e-2  # bounds of the accuracy of the others
+COUPLED_TIGHTEST = 1e-2  # lower bound of the accuracy of the others
 SCHUR_STEP = 1e-2  # accuracy of the solve with the Schur complement of the model
 SCHUR_MARGIN = 1.5  # the model's Schur complement over that of a mean fit
 GIVEN_BALANCE = 1e-3  # accuracy of the equilibrium under forces to start from
 
 # Nested grids (contactopt.methods.nested, contactopt.methods.kernels.levels, .level_steps).
 COARSEST = 12  # contacts along a side of a grid that is not halved
-NESTED_LOOSEST, NESTED_TIGHTEST = 0.1, 1e-4  # accuracy of the first steps, and of the last ones
 COARSE_ENOUGH = 3e-3  # residual at which a coarse grid has done its work, over the forces
 COARSEST_ENOUGH = 1e-4  # that of the coarsest grid, from which the others must not be led astray
 COARSE_STEPS = 30  # Newton steps on a coarse grid

@@ -111,9 +111,7 @@ class Contacts:
             if len(problem.pairs) > 1:
                 self.equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
             self.solve = Krylov(P)
-        self.accuracy = Forcing(
-            constants.KRYLOV_FIRST, constants.KRYLOV_LOOSEST, constants.KRYLOV_TIGHTEST
-        )
+        self.accuracy = Forcing(constants.KRYLOV_FIRST, constants.LOOSEST, constants.TIGHTEST)
 
     def begin(self, start: Iterate | None) -> Iterate:
         """The first point."""

@@ -60,27 +60,18 @@ def proximal_iterates(
     for problems on which every smaller alpha soon fails; the pace `eager` ends with the first
     failure.
     """
+    steps = constants.SUBPROBLEM_STEPS
     fall, rise, easy, most = {
-        "steady": (
-            constants.FALL,
-            constants.RISE,
-            constants.SUBPROBLEM_STEPS,
-            constants.SUBPROBLEM_STEPS,
-        ),
-        "gentle": (
-            constants.GENTLE_FALL,
-            constants.GENTLE_RISE,
-            constants.EASY,
-            constants.SUBPROBLEM_STEPS,
-        ),
+        "steady": (constants.FALL, constants.RISE, steps, steps),
+        "gentle": (constants.GENTLE_FALL, constants.GENTLE_RISE, constants.EASY, steps),
         "eager": (constants.FALL, np.inf, constants.EAGER_STEPS, constants.EAGER_STEPS),
     }[pace]
     while alpha < LARGEST_WEIGHT:
         equations = coulomb_equations(problem, point[0], alpha)
-        new, solved, steps = solve_subproblem(equations, matrix, point, most)
+        new, solved, taken = solve_subproblem(equations, matrix, point, most)
         yield new
         point = new if solved else point
         if not solved:
             alpha *= rise
-        elif steps <= easy:
+        elif taken <= easy:
             alpha = max(alpha / fall, LEAST_WEIGHT)

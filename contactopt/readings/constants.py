@@ -1,8 +1,8 @@
 """The chosen numbers of this room, all of them, and the commands that show what they are worth.
 
 `python -m experiments.questions.accuracy` measures readings and error estimates against exact
-solutions. `python -m experiments.questions.cost_ratio` measures what the start from a coarse mesh
-saves.
+solutions. `python -m experiments.questions.large_punch` measures whole solves that start from a
+coarse mesh.
 """
 
 # Reading edges and peaks (contactopt.readings.edges, contactopt.readings.quantities).

@@ -28,6 +28,7 @@ from contactopt.meshes.structured import simplices
 from contactopt.problem import Solution
 from contactopt.readings.peaks import Peak, Reading, at_rim, neighbours, nodal_pressure
 from contactopt.readings.resultants import views
+from contactopt.scenes.scene import Part, Scene
 
 RISE = 1.1  # by how much the pressure at a corner exceeds that of the contacts next to it, at least
 THERE = 0.05  # of the distance of contacts, within which a node is at the place of a contact
@@ -93,7 +94,7 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     )
 
 
-def _share(part: Any, scene: Any, place: np.ndarray, reach: float) -> float:
+def _share(part: Part, scene: Scene, place: np.ndarray, reach: float) -> float:
     """The share of the full angle that a body fills around a place on its boundary: half of it away
     from its vertices.
     """

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from contactopt.bodies.fields import Region
@@ -32,7 +33,7 @@ from contactopt.problem import Solution
 from contactopt.readings.peaks import Peak, Reading, maxima
 from contactopt.readings.state import Functional, Seeds, State
 from contactopt.scenes.parameters import MATERIAL, Parameter
-from contactopt.scenes.scene import Scene
+from contactopt.scenes.scene import Part, Scene
 
 if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
@@ -84,7 +85,7 @@ class StressReading(Reading):
     slopes: np.ndarray = field(kw_only=True, repr=False)
 
 
-def place_of(name: Any, scene: Scene) -> Place | None:
+def place_of(name: object, scene: Scene) -> Place | None:
     """The quantity at a place that has a name; None for other quantities. InputError for a body,
     pair, component or point that the scene does not have.
     """
@@ -103,10 +104,9 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     if kind != LARGEST and stress == kind:
         return None
     body, _, boundary = rest.partition(":")
-    meshed = {part.name: part for part in scene.parts if hasattr(part, "build_mesh")}
-    if body not in meshed:
+    if body not in scene.meshed:
         wrong = f"there is no elastic body {body!r} with a mesh" if body else "it needs a body"
-        raise InputError(f"quantity {name!r}: {wrong}; choose from {', '.join(meshed)}.")
+        raise InputError(f"quantity {name!r}: {wrong}; choose from {', '.join(scene.meshed)}.")
     if kind != LARGEST and stress not in scene.analysis.stresses:
         names = ", ".join(f"stress_{own}" for own in scene.analysis.stresses)
         raise InputError(
@@ -121,11 +121,11 @@ def place_of(name: Any, scene: Scene) -> Place | None:
     if boundary and at:
         raise InputError(f"quantity {name!r}: give either a boundary or a point.")
     if boundary or at:
-        _check_there(meshed[body], region, scene)
+        _check_there(scene.meshed[body], region, scene)
     return Place(name, kind if kind == LARGEST else stress, body, region)
 
 
-def _check_there(part: Any, region: Region, scene: Scene) -> None:
+def _check_there(part: Part, region: Region, scene: Scene) -> None:
     """InputError for a boundary that the body's first mesh lacks, and for a point far outside."""
     from contactopt.meshes.cells import straight
 
@@ -199,7 +199,7 @@ def read_stress(
     slopes[np.arange(len(slopes)) != top] = 0.0
     uncertainty = float(above.max())
 
-    def peak(i: int, doubt: float, vertices: Any) -> Peak:
+    def peak(i: int, doubt: float, vertices: ArrayLike) -> Peak:
         made = Peak(float(sizes[i]), doubt, recovered.places[:, i], recovered.size(i), body=number)
         return replace(made, elements=recovered.elements(np.asarray(vertices)))
 

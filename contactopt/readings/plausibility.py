@@ -28,6 +28,7 @@ def doubts(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
     meshed = [part for part in scene.meshed.values() if part.given]
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]
     found += [note for part in meshed for note in _faint_loads(scene, part)]
+    found += [note for part in meshed for note in _pointed(part)]
     found += _unloaded(scene, couplings)
     return [*found, *_stiffness(scene), *_sizes(meshed), *_gaps(scene, couplings)]
 
@@ -46,6 +47,20 @@ def _unloaded(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
         "nothing pushes the bodies: there is no load, no displacement of a support and no overlap;"
         " is a load missing?"
     ]
+
+
+def _pointed(part: Part) -> list[str]:
+    """Supports where the stress of a force is infinite."""
+    notes, known = [], part.mesh.boundaries or {}
+    for support in part.supports:
+        if (many := len(support.faces(known))) > 1:
+            what = "a point" if many >= part.mesh.dim() else "an edge"
+            notes.append(
+                f"the support on '{support.boundary}' of body '{part.name}' holds {what}: the"
+                " stress of a force there is infinite, and on finer meshes the displacement grows"
+                " without end; hold a face unless this support carries no force."
+            )
+    return notes
 
 
 def said_of_meshes(scene: Scene) -> list[str]:

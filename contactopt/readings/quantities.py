@@ -72,7 +72,7 @@ class Quantity:
         return Reading(self.slopes(State(reduction, solution)).value)
 
 
-def find_quantity(name: Any, scene: Scene) -> Quantity:
+def find_quantity(name: object, scene: Scene) -> Quantity:
     """Find a quantity by its name in this module's head, before anything is solved. InputError for
     what the scene does not have.
     """
@@ -102,7 +102,7 @@ def unit_of(name: str, units: tuple[str, str]) -> str:
     return known.get(name.partition(":")[0], stress)
 
 
-def quantity_of_states(name: Any, states: Sequence[Scene]) -> Quantity:
+def quantity_of_states(name: object, states: Sequence[Scene]) -> Quantity:
     """As `find_quantity`, for a scene or the states of its load path: InputError also for a
     quantity of paths where there is one state only.
     """
@@ -153,11 +153,8 @@ def _of_pair(
                 f" pressure and half-widths; name the pair, as in '{name}:{names[0]}', or ask for"
                 " the energy."
             )
-        if rest and rest not in names:
-            raise InputError(
-                f"quantity {name!r}: there is no pair of surfaces {rest!r}; the pairs are"
-                f" {', '.join(names)}."
-            )
+        if rest:
+            _check_pair(rest, scene)
         number = names.index(rest) if rest else 0
         return Quantity(
             name, lambda state: slopes(state, number), partial(_read_pair, read, number)
@@ -222,7 +219,9 @@ def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
 def _check_pair(name: str, scene: Scene) -> None:
     names = [pair.name for pair in scene.pairs]
     if name not in names:
-        raise InputError(f"there is no contact '{name}', only {', '.join(names)}.")
+        raise InputError(
+            f"there is no pair of surfaces {name!r}; the pairs are {', '.join(names)}."
+        )
 
 
 def _contacts(state: State, name: str) -> slice:

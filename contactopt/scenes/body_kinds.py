@@ -6,7 +6,7 @@ checked by the scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,13 +29,18 @@ class Support:
     """Prescribed displacement on a named boundary, eq (3) of the paper.
 
     `displacement` maps components to values [length]; None clamps every component. A symmetry plane
-    is a Support that holds the normal component only.
+    is a Support that holds the normal component only. 'a/b' is the edge where the boundaries a and
+    b meet, in the plane a point, and 'a/b/c' the point where three meet.
     """
 
     what = "support"
     form = "displacement:BODY:BOUNDARY:COMPONENT, or displacement:BODY:COMPONENT of a rigid body,"
     boundary: str
     displacement: Mapping[str, float] | None = None
+
+    def faces(self, known: Container[str]) -> tuple[str, ...]:
+        """The boundaries whose common nodes are held: one known by this name, or several."""
+        return (self.boundary,) if self.boundary in known else tuple(self.boundary.split("/"))
 
     def values(self, components: tuple[str, ...]) -> dict[str, float]:
         """The displacement by component, as Load.values."""

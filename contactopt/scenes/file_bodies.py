@@ -192,9 +192,13 @@ def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
 
 
 def _support(table: Table, mesh: Mesh, reading: Reading) -> Support:
-    boundary, values = _boundary(table, "boundary", mesh), reading.numbers(table)
+    what = 'a boundary, or those that meet in an edge or a point, as in "a/b"'
+    name = table.take("boundary", str, needed=True, what=what)
+    made = Support(name, reading.numbers(table) or None)
     table.close()
-    return Support(boundary, values or None)
+    for face in made.faces(mesh.boundaries or {}):
+        _named(table, "boundary", face, mesh, "the body")
+    return made
 
 
 def _boundary(table: Table, key: str, mesh: Mesh) -> str:

@@ -220,7 +220,7 @@ def _free(part: Any) -> Any:
     loads, and are not the whole surface where there are others.
     """
     named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
-    used = [named[own.boundary] for own in (*part.supports, *part.loads) if own.boundary]
+    used = [named[o.boundary] for o in (*part.supports, *part.loads) if o.boundary in named]
     taken = np.concatenate([np.zeros(0, dtype=int), *used])
     whole = len(part.mesh.boundary_facets())
     free = {name: own for name, own in named.items() if not np.isin(own, taken).any()}

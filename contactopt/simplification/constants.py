@@ -1,7 +1,4 @@
-"""The chosen numbers of these simplifications.
-
-`python -m experiments.questions.simplest` shows what they are worth.
-"""
+"""The chosen numbers of these simplifications, whose effect `tests/test_simplest.py` checks."""
 
 # What counts as equal (contactopt.simplification.images). The proof on the whole has the last word.
 NEAR = 1e-9  # distance of nodes from their images, over the size of the scene

@@ -16,6 +16,7 @@ from skfem import Mesh
 
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
+from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part, Rigid, Scene, Support
 from contactopt.simplification.constants import NEAR
 from contactopt.simplification.images import Images, Plane
@@ -100,7 +101,7 @@ def roller(whole: Whole) -> str:
     return ""
 
 
-def _keeps(pair: Any, whole: Whole, images: Images, kept: set[str], plane: Plane) -> bool:
+def _keeps(pair: Contact, whole: Whole, images: Images, kept: set[str], plane: Plane) -> bool:
     """Whether a pair belongs to the half: of two images one stays, on the positive side."""
     elastic = [name for name in pair.bodies if name in whole.meshes]
     if any(name not in kept for name in elastic):

@@ -115,7 +115,7 @@ def _images_of_meshes(whole: Whole, plane: Plane) -> dict[str, tuple[str, np.nda
     return found if all(found[image][0] == name for name, (image, _) in found.items()) else None
 
 
-def _nodes(mesh: Mesh, image: Any, plane: Plane, near: float) -> np.ndarray | None:
+def _nodes(mesh: Mesh, image: Mesh, plane: Plane, near: float) -> np.ndarray | None:
     """The node of a mesh on which the image of each node lies; None unless all have images."""
     here, there = plane.image(mesh.doflocs), image.doflocs
     if here.shape != there.shape or mesh.t.shape != image.t.shape:

@@ -76,6 +76,12 @@ def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | No
 
 def _chains(whole: Whole) -> Iterator[Found]:
     """Simplifications that follow each other, at first those of a section, if there is one."""
+    for name, part in whole.parts.items():
+        for support in part.supports:
+            if support.boundary not in whole.meshes[name].boundaries:
+                where = f"the support on '{support.boundary}' of body '{name}'"
+                yield [], [f"Symmetries are not looked for, because {where} holds no face."]
+                return
     found, notes = section(whole)
     if found:
         more, told = mirrored(whole_of(found[0].scene))

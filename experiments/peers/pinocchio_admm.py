@@ -38,6 +38,11 @@ def prepare(problem, tol, settings):
         setattr(options, "absolute_" + kind + "_tol", tol)
         setattr(options, "relative_" + kind + "_tol", tol)
     result = getattr(pin, name + "SolverResult")()
+    for key, value in settings.items():  # numbers, or the name of a rule
+        if key != "solver":
+            kinds = getattr(pin, "ADMMUpdateRule", None)
+            setattr(options, key, getattr(kinds, value) if isinstance(value, str) else value)
+    result.setConstraintImpulseGuess(problem["start"].ravel()[order])
     arguments = np.asfortranarray(Q), q.ravel()[order], models, datas, options, result
     return getattr(pin, name + "ConstraintSolver")(), arguments, order
 
@@ -58,6 +63,6 @@ PEER = Peer("Pinocchio", "pip install pin", [os.environ.get("PINOCCHIO", sys.exe
 
 
 @method(peer=PEER)
-def pinocchio(problem, tol=1e-8, time_limit=10.0, solver="ADMM"):
-    """Pinocchio's solver of the nonlinear complementarity problem."""
-    return PEER.answer(problem, tol, time_limit, solver=solver)
+def pinocchio(problem, tol=1e-8, time_limit=10.0, start=None, solver="ADMM", **settings):
+    """Pinocchio's solver of the nonlinear complementarity problem, with settings of its own."""
+    return PEER.answer(problem, tol, time_limit, (3,), start, solver=solver, **settings)

@@ -3,6 +3,8 @@
 Installed by `apt-get install python3-siconos`. A problem of the plane goes to the solver of the
 plane of that name, with Q as a dense matrix. The names that Siconos has in space only get such a
 problem with a second tangent along which nothing moves. In space Q goes over in sparse blocks.
+`option` sets Siconos' own parameters by their names there without "SICONOS_", numbers with a point
+among the real ones, and `local` the solver of one contact: "FRICTION_3D_NSGS_SHUFFLE=1".
 Source: Acary, Bremond, Huber (2018), On solving contact problems with Coulomb friction.
 """
 
@@ -45,12 +47,24 @@ def prepare(problem, tol, settings):
     options = sn.SolverOptions(getattr(sn, f"SICONOS_FRICTION_{dim}D_" + settings["solver"]))
     options.dparam[sn.SICONOS_DPARAM_TOL] = tol
     options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = 1000000
+    for name, _, value in (word.partition("=") for word in settings["option"].split()):
+        if f"{5 - dim}D" in name:  # of the other dimension
+            continue
+        at = getattr(sn, "SICONOS_" + name)
+        if "." in value:
+            options.dparam[at] = float(value)
+        else:
+            options.iparam[at] = int(value)
+    if settings["local"] and dim == 3:
+        at = getattr(sn, "SICONOS_FRICTION_3D_ONECONTACT_" + settings["local"])
+        sn.solver_options_update_internal(options, 0, at)
+    r = problem["start"].ravel().copy()
     if dim == 2:
         Q = np.zeros((k, k, 2, 2))
         Q[np.repeat(np.arange(k), np.diff(problem["indptr"])), columns] = blocks
         Q = np.asfortranarray(Q.swapaxes(1, 2).reshape(size, size))
         made = sn.FrictionContactProblem(2, k, Q, q.ravel(), problem["mu"])
-        return sn.fc2d_driver, made, np.zeros(size), np.zeros(size), options
+        return sn.fc2d_driver, made, r, np.zeros(size), options
     ends = 3 * np.arange(1, k + 1)
     numbers = [3, k, 1, size, size, number, k, k, *ends, *ends, k + 1, number]
     numbers += [*problem["indptr"], *columns]
@@ -61,7 +75,7 @@ def prepare(problem, tol, settings):
         file.write("\n".join(map(str, numbers)))
         file.flush()
         made = sn.frictionContact_new_from_filename(file.name)
-    return sn.fc3d_driver, made, np.zeros(size), np.zeros(size), options
+    return sn.fc3d_driver, made, r, np.zeros(size), options
 
 
 def solve(prepared):
@@ -77,10 +91,11 @@ PEER = Peer("Siconos", "apt-get install python3-siconos", ["python3", "/usr/bin/
 
 
 @method(peer=PEER)
-def siconos(problem, tol=1e-8, time_limit=10.0, solver="NSGS"):
+def siconos(problem, tol=1e-8, time_limit=10.0, start=None, solver="NSGS", option="", local=""):
     """One of Siconos' solvers on the dimensionless problem."""
     dims = [dim for dim, names in SOLVERS.items() if solver in names]
     if not dims:
         names = sorted({name for known in SOLVERS.values() for name in known})
         raise InputError(f"unknown solver of Siconos {solver!r}; choose from {', '.join(names)}.")
-    return PEER.answer(problem, tol, time_limit, dims, solver=solver)
+    given = {"solver": solver, "option": option, "local": local}
+    return PEER.answer(problem, tol, time_limit, dims, start, **given)

@@ -22,7 +22,7 @@ from experiments.report import template, write
 TOL = 1e-8
 LIMIT = 20.0  # seconds a file
 REPEATS, LONG = 3, 2.0  # a solve that takes longer than so many seconds is not repeated
-SOLVERS = ("NSGS", "PROX", "ADMM", "NSN_AC", "VI_EG")
+SOLVERS = ("NSGS", "PROX", "ADMM", "NSN_AC", "VI_EG", "CPG", "LEMKE")
 SHIFT = 1e-3  # of the shifted geometric means [s]
 
 
@@ -31,7 +31,7 @@ def of_siconos(problem: InterfaceProblem, solver: str) -> float | None:
     times: list[float] = []
     while len(times) < REPEATS and max(times, default=0.0) < LONG:
         try:
-            answer = siconos(problem, TOL, LIMIT, solver)
+            answer = siconos(problem, TOL, LIMIT, solver=solver)
         except InputError:  # not installed
             return None
         if answer.status != "solved":

@@ -24,6 +24,7 @@ import scipy.sparse as sp
 
 from contactopt import InterfaceProblem, all_solutions, natural_map_residual, solve
 from contactopt.benchmark import testset
+from contactopt.benchmark.sequences import Sequence
 from contactopt.benchmark.testset.tags import invariants
 from contactopt.errors import BackendError, InputError
 from contactopt.problem.contact_status import contact_status
@@ -32,6 +33,7 @@ from experiments.report import template, write
 TOL, USUAL = 1e-12, 1e-8
 FIRST = ("newton", "proximal", "acary_cadoux")
 SECOND = ("lemke", "nsgs", "admm")
+STATE_LIMIT = 1.0  # of a state of a sequence
 LIMIT = {"small": 8.0, "medium": 20.0, "large": 60.0}  # seconds of each method
 ENUMERATED = 6  # contacts up to which all solutions are listed
 MOST = 5000  # components up to which Newton's steps are taken on dense matrices
@@ -104,8 +106,29 @@ def answers(
             return
 
 
-def reference(problem: InterfaceProblem, limit: float) -> dict[str, Any]:
+def of_sequence(sequence: Sequence) -> dict[str, Any]:
+    """Small numbers of the answers to all states: the worst of each, and sums of time."""
+    found = [reference(state, STATE_LIMIT) for state in sequence.states]
+    known: dict[str, Any] = {"hash": sequence.fingerprint, "invariants": invariants(sequence)}
+    known["auto"] = next((one["auto"] for one in found if one["auto"] != "solved"), "solved")
+    known["seconds"] = short(sum(one["seconds"] for one in found))
+    pairs = [[*one["certificates"].values()] for one in found]
+    known["certificates"] = {
+        name: max(pair[place] for pair in pairs)
+        for place, name in enumerate(("first", "second"))
+        if all(len(pair) > place for pair in pairs)
+    }
+    known["forces"] = float(f"{np.linalg.norm([one.get('forces', 0.0) for one in found]):.12g}")
+    for key in ("distance of forces", "distance of displacements"):
+        if all(key in one for one in found):
+            known[key] = max(one[key] for one in found)
+    return known
+
+
+def reference(problem: InterfaceProblem | Sequence, limit: float) -> dict[str, Any]:
     """Small numbers of the answers of two methods, or of the proof that there is no solution."""
+    if isinstance(problem, Sequence):
+        return of_sequence(problem)
     known: dict[str, Any] = {"hash": problem.fingerprint, "invariants": invariants(problem)}
     seconds = np.inf
     for _ in range(2):  # the first call may import what it needs
@@ -145,9 +168,9 @@ def short(value: Any) -> float:
     return float(f"{float(value):.3g}")
 
 
-def solutions(problem: InterfaceProblem) -> int | None:
+def solutions(problem: InterfaceProblem | Sequence) -> int | None:
     """How many solutions a small problem has."""
-    if problem.contacts > ENUMERATED:
+    if isinstance(problem, Sequence) or problem.contacts > ENUMERATED:
         return None
     try:
         return len(all_solutions(problem))
@@ -170,6 +193,10 @@ def compute(name: str, tier: str, again: bool) -> None:
     known = {one.name: known[one.name] for one in of_set if one.name in known}
     for one in of_set:
         if one.tier == tier and (again or "reference" not in known.get(one.name, {})):
+            cold = known.get(one.name.replace("warm=True", "warm=False"), {})
+            if "reference" in cold:  # a sequence has the same states and answers from cold
+                known[one.name] = cold
+                continue
             problem = one.load()
             tags = testset.tags_of(problem) | {"solutions": solutions(problem)}
             known[one.name] = {"tags": tags}
@@ -224,7 +251,7 @@ def report(name: str) -> None:
         f"{stored.count(tier)} of {sum(one.tier == tier for one in of_set)} {tier}"
         for tier in testset.TIERS
     )
-    text = TEXT.format(tol=TOL, stored=len(stored), all=len(of_set), tiers=tiers)
+    text = TEXT.format(name=name, tol=TOL, stored=len(stored), all=len(of_set), tiers=tiers)
     tables = {"families": rows} | ({"missing": missing} if missing else {})
     write("reference_answers", "Reference answers", text, tables, {})
 
@@ -236,7 +263,7 @@ def largest(known: list[dict[str, Any]], key: str) -> Any:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--tier", choices=testset.TIERS)
-    parser.add_argument("--testset", default="1")
+    parser.add_argument("--testset", default=testset.NEWEST)
     parser.add_argument("--again", action="store_true")
     given = parser.parse_args()
     if given.tier:

@@ -72,7 +72,7 @@ these numbers?
 
 - The memory is estimated at {min(ratios):.2g} to {max(ratios):.2g} times the peak of the process.
 - The time is estimated at {min(times):.2g} to {max(times):.2g} times the CPU time of assembly,
-  solution and certificate. The costs were fitted to other meshes ([the ways](../ways/report.md)).
+  solution and certificate. The costs were fitted to other meshes.
 
 {{estimates}}
 

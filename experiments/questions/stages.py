@@ -58,7 +58,7 @@ def all_problems(folders: list[str]) -> Problems:
     for folder in folders:
         for path in sorted(Path(folder).glob("*.hdf5")):
             found[path.name] = "FCLib", lambda path=path: fclib.read(path)
-    for one in problems():
+    for one in problems(testset="1"):
         if one.tier in TIERS:
             found[one.name] = f"test set, {one.tier}", one.load
     return found

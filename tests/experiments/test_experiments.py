@@ -110,15 +110,3 @@ def test_every_command_that_is_named_somewhere_exists():
     }
     assert len(named) > 5
     assert not [(module, path) for module, path in sorted(named) if find_spec(module) is None]
-
-
-@pytest.mark.slow
-def test_what_is_called_exact_of_nearly_symmetric_scenes_is_right():
-    from experiments.questions import simplest
-
-    checks = [simplest.checked(number) for number in (5, 9, 10, 0, 1, 2)]
-    assert [bool(row["exact"]) for row in checks] == [row["spoilt by"] == 0 for row in checks]
-    assert (
-        max(row["certificate"] for row in checks) < 1e-8
-        and sum(row["wrong"] for row in simplest.table(checks)) == 0
-    )

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from contactopt.benchmark.families.half_planes import half_plane
+from contactopt.benchmark.families.packings import packing
+from contactopt.benchmark.families.rigid_blocks import rigid_blocks
 from contactopt.errors import InputError
-from contactopt.problem import InterfaceProblem
+from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes import make_scene
 from contactopt.scenes.scene import Scene
@@ -56,6 +60,52 @@ def reduced(name: str, **parameters: Any) -> InterfaceProblem:
     return problem_of(scene(name, **parameters))
 
 
+def of_name(of: str, **parameters: Any) -> InterfaceProblem:
+    """The problem of a scene, of a family in OTHERS, or of two names such as "held punch-2d"."""
+    name, _, inner = of.partition(" ")
+    if name in OTHERS:
+        return OTHERS[name](*([inner] if inner else []), **parameters)
+    return reduced(of, **parameters)
+
+
+def pressing(of: str, **parameters: Any) -> tuple[InterfaceProblem, np.ndarray, float]:
+    """The problem `of` as if its plate were held at the origin; the displacements (k, dim) that its
+    plate makes where it stands without friction, and how far it is pressed in [length].
+
+    InputError unless the plate is one motion along the normals.
+    """
+    made = of_name(of, **parameters)
+    if len(made.s) != 1 or np.abs(made.V.reshape(made.q.shape)[:, 1:]).max() > 1e-12:
+        raise InputError(f"'held' needs a plate that moves along the normals; '{of}' has none.")
+    lam = _pressed(made.altered(law=Coulomb(np.zeros(made.contacts))), "held").multipliers
+    free = InterfaceProblem(
+        made.Q, made.q, made.law, areas=made.areas, coordinates=made.coordinates
+    )
+    return free, (made.V @ lam).reshape(made.q.shape), float(abs(lam[0]))
+
+
+def held(of: str, depth: float = 1.0, drag: float = 0.0, **parameters: Any) -> InterfaceProblem:
+    """The problem `of` with its plate held where it is pressed to: a problem without plates.
+
+    The plate stands at `depth` times the place where its load brings it without friction, and is
+    moved along the first tangent by `drag` times mu times that depth.
+    """
+    free, pressed, far = pressing(of, **parameters)
+    q = free.q + depth * pressed
+    q[:, 1] += drag * depth * far * free.mu
+    return replace(free, q=q)
+
+
+def _pressed(problem: InterfaceProblem, family: str) -> Solution:
+    """The solution of the frictionless problem that a family is made of."""
+    from contactopt.methods.driver import solve
+
+    found = solve(problem, tol=NORMAL_TOL)
+    if not found.solved:
+        raise InputError(f"the normal problem behind '{family}' was not solved: {found.message}")
+    return found
+
+
 def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) -> InterfaceProblem:
     """The friction of a scene under given normal forces (Tresca's problem) as a contact problem
     without coupling.
@@ -66,15 +116,9 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
     first axis that would need the force shear * mu * p if nothing slipped. `of` and `parameters`
     are the name of the scene and its arguments.
     """
-    from contactopt.methods.driver import solve
-
     coupled = reduced(of, mu=0.0, **parameters)
     k, dim = coupled.q.shape
-    pressed = solve(coupled, tol=NORMAL_TOL)
-    if not pressed.solved:
-        raise InputError(
-            f"the normal problem behind 'tangential' was not solved: {pressed.message}"
-        )
+    pressed = _pressed(coupled, "tangential")
     p = np.maximum(pressed.reactions[:, 0], 0.0)
     tangents = np.arange(k * dim).reshape(k, dim)[:, 1:].ravel()
     Q = np.zeros_like(coupled.Q)
@@ -92,8 +136,8 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
 
 
 def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
-    """Every contact of the scene listed several times, so that Q is rank-deficient."""
-    p = reduced(of, **parameters)
+    """Every contact of the problem `of` listed several times, so that Q is rank-deficient."""
+    p = of_name(of, **parameters)
     index = np.repeat(np.arange(p.q.size).reshape(p.q.shape), copies, axis=0).ravel()
     return InterfaceProblem(
         p.Q[np.ix_(index, index)],
@@ -127,9 +171,15 @@ def by_products(of: str, **parameters: Any) -> InterfaceProblem:
 
 
 def skewed(of: str, skew: float = 0.1, seed: int = 0, **parameters: Any) -> InterfaceProblem:
-    """The scene with D S D added to Q, S random and skew, |S| = skew, D^2 the diagonal."""
-    made = reduced(of, **parameters)
+    """The problem `of` with D S D added to Q, S random and skew, |S| = skew, D^2 the diagonal."""
+    made = of_name(of, **parameters)
     random = np.random.default_rng(seed).normal(size=made.Q.shape)
     S = random - random.T
     D = np.sqrt(np.diag(made.Q))
     return replace(made, Q=made.Q + skew / np.linalg.norm(S, 2) * D[:, None] * S * D)
+
+
+# families besides scenes that others are made of
+OTHERS: dict[str, Callable[..., InterfaceProblem]] = {
+    make.__name__: make for make in (half_plane, held, packing, rigid_blocks)
+}

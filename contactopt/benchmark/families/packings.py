@@ -37,6 +37,23 @@ def packing(
     spin      angle by which the frame of the observer turns in the step. Coriolis' forces make M,
               and with it W, unsymmetric
     """
+    W, fall, shaken, gaps = parts_of_packing(dim, bodies, seed, points, disorder, spin)
+    q = fall + shake * shaken
+    q[:, 0] += gaps
+    return InterfaceProblem(W, q, Coulomb(np.full(len(q), mu)))
+
+
+def parts_of_packing(
+    dim: int,
+    bodies: int,
+    seed: int,
+    points: int = 1,
+    disorder: float = 0.3,
+    spin: float = 0.0,
+) -> tuple[sp.csr_array, np.ndarray, np.ndarray, np.ndarray]:
+    """W of a packing; contact velocities (m, dim) that gravity makes in the step, and random ones;
+    gaps (m,). The arguments are those of `packing`.
+    """
     if dim not in (2, 3) or bodies < 2**dim or points < 1:
         raise InputError("packing needs dim 2 or 3, at least 2^dim bodies, and points at least 1.")
     rng = np.random.default_rng(seed)
@@ -58,20 +75,20 @@ def packing(
     inverse[fixed] = 0.0
     pairs = np.repeat(pairs, points, axis=0)
     H = velocities(places, pairs, *_places_of_contact(places, pairs, points, rng))
-    free = np.zeros((len(places), dim + turns))
-    free[:, dim - 1] = -1.0
-    free += shake * 0.3 * rng.normal(size=free.shape)
-    free[fixed] = 0.0
+    free = np.zeros((2, len(places), dim + turns))  # falling, shaken
+    free[0, :, dim - 1] = -1.0
+    free[1] = 0.3 * rng.normal(size=free[1].shape)
+    free[:, fixed] = 0.0
     inertial = sp.diags_array(inverse.ravel())
+    motion = free.reshape(2, -1).T
     if spin:  # (m I + 2 m spin [[0, -1], [1, 0]])^-1 m in the first two directions
         turned = np.eye(dim + turns)
         turned[:2, :2] = np.linalg.inv([[1, -2 * spin], [2 * spin, 1]])
         turned = sp.kron(sp.eye_array(len(places)), turned, format="csr")
-        inertial, free = turned @ inertial, (turned @ free.ravel()).reshape(free.shape)
-    W = H @ inertial @ H.T
-    q = (H @ free.ravel()).reshape(-1, dim)
-    q[:, 0] += np.maximum(0.0, rng.normal(size=len(q)) - 0.5) * 0.2  # some are not touching yet
-    return InterfaceProblem(sp.csr_array(W), q, Coulomb(np.full(len(q), mu)))
+        inertial, motion = turned @ inertial, turned @ motion
+    fall, shaken = (H @ motion).T.reshape(2, -1, dim)
+    gaps = np.maximum(0.0, rng.normal(size=len(fall)) - 0.5) * 0.2  # some are not touching yet
+    return sp.csr_array(H @ inertial @ H.T), fall, shaken, gaps
 
 
 def _pairs(places: np.ndarray, longest: float) -> np.ndarray:

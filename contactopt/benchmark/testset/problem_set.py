@@ -13,6 +13,7 @@ from typing import Any
 
 from contactopt.benchmark.entries import Entries
 from contactopt.benchmark.problems import KINDS, ProblemSpec, named
+from contactopt.benchmark.sequences import Sequence
 from contactopt.benchmark.testset.tags import TAGS, tags_of
 from contactopt.checks import check_count
 from contactopt.errors import InputError
@@ -20,6 +21,8 @@ from contactopt.files.toml_table import read_table
 from contactopt.problem import InterfaceProblem
 
 TIERS = ("small", "medium", "large")
+SETS = ("1", "2")
+NEWEST = SETS[-1]
 HERE = Path(__file__).parent
 COMPARE = {"<": operator.lt, ">": operator.gt, "=": operator.eq}
 WORDS = {"true": True, "false": False}
@@ -46,20 +49,20 @@ class Problem:
     @cached_property
     def tags(self) -> dict[str, Any]:
         """What the problem is like; computed, where the set's file does not say it."""
-        return dict(self.known.get("tags") or tags_of(self.load()))
+        return {"states": 1} | dict(self.known.get("tags") or tags_of(self.load()))
 
     @property
     def reference(self) -> dict[str, Any] | None:
         """Small numbers of the reference answer; None if there is none."""
         return self.known.get("reference")
 
-    def load(self) -> InterfaceProblem:
+    def load(self) -> InterfaceProblem | Sequence:
         """Generate the problem, or read it from its file; InputError where that makes none."""
         return self.spec.build({})
 
 
 def problems(
-    tier: str = "", tags: Iterable[str] = (), testset: str = "1", folder: Path = Path()
+    tier: str = "", tags: Iterable[str] = (), testset: str = NEWEST, folder: Path = Path()
 ) -> list[Problem]:
     """The problems of a test set, in its order: of one of TIERS or of all, and with `tags` that all
     hold, such as "dim=3", "contacts<100" or "symmetric=false". InputError for an unknown set, tier

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.benchmark.sequences import Sequence, states_of
 from contactopt.linear.operators import form, has_entries
 from contactopt.methods.diagnosis import diagnose
 from contactopt.problem import InterfaceProblem, infeasibility
@@ -17,6 +18,7 @@ MOST = 1200  # components up to which Q's eigenvalues are computed
 TAGS = {
     "dim": "2 or 3",
     "contacts": "number of contacts",
+    "states": "number of consecutive problems, 1 for a problem alone",
     "motions": "number of free motions, the columns of V",
     "law": "law of contact",
     "mu": "largest friction coefficient",
@@ -31,14 +33,18 @@ TAGS = {
 }
 
 
-def tags_of(problem: InterfaceProblem) -> dict[str, Any]:
-    """The tags of a problem, by the keys of TAGS. None stands for what was not computed because the
-    problem is large, or because its law or its form does not allow it.
+def tags_of(given: InterfaceProblem | Sequence) -> dict[str, Any]:
+    """The tags of a problem, or of the last state of a sequence, by the keys of TAGS. None stands
+    for what was not computed because the problem is large, or because its law or its form does not
+    allow it.
     """
+    states = states_of(given)
+    problem = states[-1]
     products = not has_entries(problem.Q)
     tags: dict[str, Any] = {
         "dim": problem.dim,
         "contacts": problem.contacts,
+        "states": len(states),
         "motions": len(problem.s),
         "law": type(problem.law).__name__.lower(),
         "mu": float(problem.mu.max(initial=0.0)),
@@ -60,11 +66,20 @@ def _short(value: float) -> float | None:
     return float(f"{value:.4g}") if np.isfinite(value) else None
 
 
-def invariants(problem: InterfaceProblem) -> dict[str, float]:
-    """Norms of q, Q x, V' x (x_i = cos i), s and mu, to ten digits, which rounding keeps."""
-    x = np.cos(np.arange(problem.q.size))
-    parts = {"q": problem.q, "Qx": problem.Q @ x, "Vx": problem.V.T @ x, "s": problem.s}
+def invariants(given: InterfaceProblem | Sequence) -> dict[str, float]:
+    """Norms of q, Q x, V' x (x_i = cos i), s and mu, of all states, to ten digits, which rounding
+    keeps.
+    """
+    states = states_of(given)
+    x = np.cos(np.arange(states[0].q.size))
+    parts = {
+        "q": [p.q for p in states],
+        "Qx": [states[0].Q @ x],
+        "Vx": [states[0].V.T @ x],
+        "s": [p.s for p in states],
+        "mu": [p.mu for p in states],
+    }
     return {
-        name: float(f"{np.linalg.norm(part):.10g}")
-        for name, part in (parts | {"mu": problem.mu}).items()
+        name: float(f"{np.linalg.norm(np.concatenate([*map(np.ravel, part)])):.10g}")
+        for name, part in parts.items()
     }

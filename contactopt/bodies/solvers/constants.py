@@ -7,8 +7,7 @@ None of them changes what a solver converges to. They change only how long it ta
 from __future__ import annotations
 
 # `python -m experiments.questions.body_solvers` measures time and memory of every solver over the
-# number of unknowns of a 3D body, and `python -m experiments.questions.cost_ratio` whole solves in
-# the plane and in space.
+# number of unknowns of a 3D body.
 PARDISO_FROM = 5_000  # unknowns of a body from which PARDISO is faster, its library loaded or not
 
 # The limits for a body by itself. In a scene contactopt.coupling.costs chooses for all its bodies.
@@ -23,7 +22,7 @@ COARSEST = 60  # nodes or aggregates that multigrid does not coarsen further
 NEAR = 1.5  # neighbours at up to this multiple of the least distance are aggregated
 DEGREE = 3  # products with A in the smoother, which is a polynomial of this degree less one
 
-# V-cycles for a decimal digit of a solve, as `python -m experiments.questions.ways` has them
+# V-cycles for a decimal digit of a solve, as `python -m experiments.questions.large_punch` has them
 USUAL = 1.7
 
 # Limits, not fitted.

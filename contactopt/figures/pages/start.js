@@ -81,7 +81,7 @@ function chart(box, lines, across, up, {x = "linear", y = "linear"} = {}) {
     }
   }
   const legend = element("p", "", {class: "legend"});
-  for (const {name, ink} of seen) if (name) { const one = element("span", name); one.style.setProperty("--ink", ink); legend.append(one); }
+  for (const {name, ink, quiet} of seen) if (name && !quiet) { const one = element("span", name); one.style.setProperty("--ink", ink); legend.append(one); }
   box.append(picture, legend);
 }
 

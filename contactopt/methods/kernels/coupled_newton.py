@@ -47,7 +47,8 @@ from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.certificate import Moved
 
-USUAL = 8  # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.ways`)
+# V-cycles of all bodies for the bonded solution (`python -m experiments.questions.large_punch`)
+USUAL = 8
 IDLE = 3  # steps without progress after which it begins anew
 
 
@@ -169,7 +170,7 @@ class CoupledSteps:
         self.best = np.inf
 
     def restart(self, first: float) -> None:
-        self.accuracy = Forcing(first, constants.COUPLED_LOOSEST, constants.COUPLED_TIGHTEST)
+        self.accuracy = Forcing(first, constants.LOOSEST, constants.COUPLED_TIGHTEST)
         self.idle = 0
 
     def begin(self, start: Iterate | None) -> State | None:

@@ -155,7 +155,7 @@ def interior_iterates(
         gap = cones.gap(x, z, lam, slip)
         point, error = cones.answer(x, z, lam, gap)
         yield point, error
-        since = 0 if error < constants.INTERIOR_PROGRESS * best else since + 1
+        since = 0 if error < constants.PROGRESS * best else since + 1
         best = min(best, error)
         if error < NEAR or since >= constants.STALLED or not np.isfinite(error):
             return

@@ -39,8 +39,8 @@ class GridSteps:
 
     def __init__(self, level: Level, enough: float, least: float = 0.0):
         self.level, self.enough, self.least = level, enough, least
-        loosest = constants.NESTED_LOOSEST
-        self.accuracy = Forcing(loosest, loosest, constants.NESTED_TIGHTEST)
+        loosest = constants.LOOSEST
+        self.accuracy = Forcing(loosest, loosest, constants.TIGHTEST)
 
     def near(self, r: np.ndarray) -> float:
         """The residual that is enough at forces r."""
@@ -54,7 +54,7 @@ class GridSteps:
     def change(self, at: Evaluation) -> Point:
         worth, near = self.accuracy(at.residual), self.near(at.point[0])
         if at.residual > near:
-            worth = max(worth, min(ENOUGH * near / at.residual, constants.NESTED_LOOSEST))
+            worth = max(worth, min(ENOUGH * near / at.residual, constants.LOOSEST))
         known = at.error.copy()
         known[:, at.closed] = 0.0
         balance = -at.balance - np.einsum("ckp,ck->p", self.level.V, known)

@@ -24,7 +24,6 @@ for frictional contact problems prone to Newton like solution methods.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
 
 import numpy as np
 
@@ -116,7 +115,7 @@ def find_law(name: str) -> type[Law]:
     return law
 
 
-def make_law(name: str, value: Any, place: Place, positions: np.ndarray) -> Law:
+def make_law(name: str, value: object, place: Place, positions: np.ndarray) -> Law:
     """Make the law that a scene means at its contacts.
 
     Parameters

@@ -14,6 +14,7 @@ class Axisymmetric(Kind):
     components = ("r", "z")
     stresses = ("rr", "zz", "tt", "rz")
     revolved = True
+    deck = "CAX"
 
     def measure(self, thickness: float) -> float:
         return 2 * pi

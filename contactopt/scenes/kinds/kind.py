@@ -15,7 +15,7 @@ class Kind:
     stresses    components of a stress, in the order of files
     revolved    whether the bodies are those that the section makes around an axis, its second one
     stretches   whether a body is free to strain across the plane, where it then has no stress
-    deck        names of elements in a deck of CalculiX begin so; empty: there are none that fit
+    deck        names of elements in a deck of CalculiX begin so
     """
 
     name: ClassVar[str]

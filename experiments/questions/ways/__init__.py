@@ -1,1 +1,0 @@
-"""Which way to the solution is the cheapest on meshes that nobody prepared?"""

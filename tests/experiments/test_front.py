@@ -1,0 +1,121 @@
+"""What accuracy costs: known answers, the rule that is made from them, and penalties."""
+
+import numpy as np
+import pytest
+
+from contactopt import Material, scenes, solve
+from contactopt.accuracy.proposal import propose
+from contactopt.figures.scene_check import check_scene
+from experiments.questions import penalty
+from experiments.questions.front.bodies import ellipse, half_space, point
+from experiments.questions.front.draw import cheapest
+from experiments.questions.front.measured import solved
+from experiments.questions.front.unseen import attempt, power, unseen
+
+STEEL = Material(210e3, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("known", "width"),
+    [
+        (ellipse(0.4), None),
+        (ellipse(0.999), 0.999**0.5),
+        (power(4, True, STEEL), None),
+        (power(4, False, STEEL), None),
+        (power(2, False, STEEL), 1.0),
+    ],
+)
+def test_known_answers_are_those_of_a_fine_grid(known, width):
+    found = solved(half_space(known), 32, 1e-9, "auto")
+    problem, solution = found.reduction.problem, found.solution
+    assert solution.reactions[:, 0].sum() == pytest.approx(known.force, rel=1e-6)
+    if known.exact.peak is not None:
+        peak = (solution.reactions[:, 0] / problem.areas).max()
+        assert peak == pytest.approx(known.exact.peak, rel=5e-3)
+    if known.exact.approach is not None:
+        assert -solution.multipliers[0] == pytest.approx(known.exact.approach, rel=2e-3)
+    if width is not None:
+        assert known.exact.half_width == pytest.approx(width)
+
+
+def test_an_ellipse_that_is_round_is_hertz():
+    made, round_ = ellipse(0.9999), point(ellipse(0.9999).force, 1 / 0.157, STEEL)
+    a = made.profile(np.array([[1.0], [0.0]]))[0], made.profile(np.array([[0.0], [1.0]]))[0]
+    assert a[0] == pytest.approx(a[1], rel=1e-3)
+    assert made.exact.approach == pytest.approx(2 * a[0], rel=1e-3)
+    assert round_.profile(np.array([[1.0], [0.0]]))[0] == pytest.approx(0.157 / 2)
+
+
+@pytest.mark.parametrize(
+    ("asked", "degree", "elements"),
+    [
+        (("pressure", 0.01, "free", np.inf), 0, 16),
+        (("pressure", 0.01, "free", 5.0), 1, 8),  # the body is no half-space
+        (("approach", 0.001, "free", 1e4, (1, 2)), 2, 22),
+        (("stick", 0.003, "corner", np.inf, (1, 2)), 1, 58),
+    ],
+)
+def test_the_rule_takes_the_cheapest_mesh_for_an_accuracy(asked, degree, elements):
+    found = propose(*asked)
+    assert (found.degree, found.elements) == (degree, elements)
+    assert found.tolerance == pytest.approx(asked[1] / 100)
+
+
+def test_there_is_no_rule_for_what_was_not_measured():
+    assert propose("energy", 0.01, "free", np.inf) is None
+    assert propose("pressure", 0.01, "corner", np.inf) is None  # which is infinite
+
+
+def test_the_rule_meets_its_accuracy_on_scenes_that_it_has_not_seen():
+    for case in unseen():
+        if case.name in ("steel ball", "layer", "sleeve, slice"):
+            degrees = tuple(case.ways)
+            rule = propose(case.quantity, case.accuracy, case.edge, case.size, degrees)
+            assert (rule.degree == 0) == (case.name == "steel ball")
+            error = attempt(case, rule.degree, rule.elements, rule.tolerance)[1]
+            assert abs(error) <= case.accuracy, case.name
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("sphere", "8 elements across the half-width of contact (here 32)"),
+        ("hertz-half-space", "16 points across the half-width of contact (here 48)"),
+        ("rigid-punch-2d", "for 1% of the stick width"),
+        ("punch-2d", ""),  # two elastic bodies with corners
+        ("arch", ""),
+    ],
+)
+def test_check_says_what_one_percent_takes(name, words):
+    text = check_scene((scenes.make_scene(name),)).text
+    lines = [line for line in text.splitlines() if line.startswith("for 1%")]
+    assert (words in lines[0]) if words else not lines
+
+
+def test_the_cheapest_run_has_the_accuracy_and_not_by_luck():
+    runs = [("half-space", 8, 0.02, 1.0), ("plane", 4, -1e-4, 0.5), ("plane", 8, 0.02, 2.0),
+            ("plane", 16, -0.005, 3.0)]  # fmt: skip
+    keys = {"scene": "Cattaneo", "tolerance": 1e-9, "reading": "fitted"}
+    names = ("model", "mesh", "stick", "cpu")
+    rows = [keys | dict(zip(names, run)) for run in runs]
+    assert cheapest(rows, "Cattaneo", 0.01)["cpu"] == 3.0  # not the lucky mesh of 4
+    assert cheapest(rows, "Cattaneo", 0.03)["cpu"] == 0.5
+    assert cheapest(rows[:1] + rows[2:], "Cattaneo", 0.03)["cpu"] == 1.0
+    assert cheapest(rows[:1] + rows[2:], "Cattaneo", 0.03, meshed=True)["cpu"] == 2.0
+    assert cheapest(rows, "Cattaneo", 1e-3) is None
+
+
+def test_forces_of_the_true_problem_are_a_fixed_point_of_the_augmented_lagrangian():
+    _, exact, unit = penalty.scene_of(8)
+    problem = penalty.scene_of(8)[0].problem
+    for factor in (0.1, 10.0):
+        made = penalty.softened(problem, factor * unit, exact.reactions)
+        again = solve(made, tol=1e-12).reactions
+        np.testing.assert_allclose(again, exact.reactions, atol=1e-8 * np.abs(again).max())
+        first = solve(penalty.softened(problem, factor * unit), tol=1e-12)
+        u = penalty.gaps(problem, first)[:, 0]  # a penalty carries what overlaps
+        np.testing.assert_allclose(
+            first.reactions[:, 0],
+            factor * unit * np.maximum(-u, 0),
+            atol=1e-7 * np.abs(again).max(),
+        )
