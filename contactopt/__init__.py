@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from contactopt.problem.transfer import transfer
     from contactopt.runner import Result, run
     from contactopt.scenes.contact import Contact
+    from contactopt.scenes.matrix_part import MatrixPart
     from contactopt.scenes.scene import (
         BodyForce,
         HalfSpace,
@@ -75,6 +76,7 @@ _HOMES = {
     "problem.transfer": "transfer",
     "runner": "Result run",
     "scenes.contact": "Contact",
+    "scenes.matrix_part": "MatrixPart",
     "scenes.scene": "BodyForce Bolt HalfSpace Part Plate Pressure Rigid Scene Support Traction",
     "simplification.findings": "Simplification Simplified",
     "simplification.search": "simplify",

@@ -55,10 +55,12 @@ def write(
     text: str,
     tables: Tables,
     figures: dict[str, Any],
+    command: str = "",
 ) -> None:
     """Write reports/name/ with its report.
 
-    `text` is Markdown in which {table} stands for the table of that name.
+    `text` is Markdown in which {table} stands for the table of that name; `command` is the module
+    that makes it, by default experiments.questions.name.
     """
     folder = REPORTS / name
     folder.mkdir(parents=True, exist_ok=True)
@@ -70,7 +72,8 @@ def write(
         body = body.replace(f"{{{stem}}}", markdown(rows))
     path = folder / "report.md"
     pictures = "\n\n".join(f"![{stem}]({stem}.png)" for stem in figures)
-    foot = f"Made by `python -m experiments.questions.{name}`.\nEnvironment: {environment()}."
+    made = command or f"experiments.questions.{name}"
+    foot = f"Made by `python -m {made}`.\nEnvironment: {environment()}."
     path.write_text(f"# {title}\n\n{body}\n\n{pictures}\n\n{foot}\n".replace("\n\n\n\n", "\n\n"))
     print(path.read_text())
 

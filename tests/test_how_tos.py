@@ -18,6 +18,7 @@ from contactopt.cli import main
 
 SITE = Path(__file__).parents[1] / "experiments" / "site"
 PAGES = (
+    "bring_your_own_matrices",
     "parts_from_cad",
     "scene_files",
     "check_before_solving",

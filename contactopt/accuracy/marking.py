@@ -90,7 +90,7 @@ def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
     return _with_meshes(scene, lambda part: bent(part.mesh, shapes.of(part)))
 
 
-def left_out(part: Body, shapes: Shapes) -> np.ndarray:
+def left_out(part: Any, shapes: Shapes) -> np.ndarray:
     """The volumes (elements,) between the straight facets of a body and its curves; (0,) for a body
     without a mesh, and zeros where edges follow the curves.
     """
@@ -264,6 +264,6 @@ def check_refinable(scene: Scene) -> None:
     """InputError, before anything is solved, for a scene that has no mesh to refine."""
     if not any(hasattr(part, "mesh") for part in scene.parts):
         raise InputError(
-            f"scene '{scene.name}' has no mesh to refine: give the points of its half-spaces as a"
-            " function (elements, zone) -> points."
+            f"scene '{scene.name}' has no mesh to refine: give the points of half-spaces as a"
+            " function (elements, zone) -> points; bodies by matrices are as fine as they are."
         )

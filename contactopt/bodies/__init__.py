@@ -10,6 +10,7 @@ from typing import Any
 
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.errors import InputError
+from contactopt.scenes.matrix_part import MatrixPart
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
 # class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody,
@@ -21,6 +22,7 @@ BODIES: dict[type, tuple[str, str, str]] = {
         "assemble_elastic",
         "finite elements with linear elasticity",
     ),
+    MatrixPart: (f"{ROOM}.matrix_body", "assemble_matrices", "matrices of another code"),
     Rigid: (f"{ROOM}.rigid", "assemble_rigid", "a rigid body"),
     HalfSpace: (
         f"{ROOM}.half_space",

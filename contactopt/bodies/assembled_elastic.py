@@ -96,7 +96,7 @@ class AssembledElastic(AssembledBody):
             trace.weights[:, nodes],
             places,
             tuple(
-                _trace(trace.weights, trace.nodes, row, held, along)
+                trace_of(trace.weights, trace.nodes, row, held, along)
                 for row, along in zip(unknowns, np.abs(trace.normals) <= tilts)
             ),
             held[unknowns[:, trace.nodes]],
@@ -141,7 +141,7 @@ class AssembledElastic(AssembledBody):
         return condense(self.body, solver, entries)
 
 
-def _trace(
+def trace_of(
     weights: sp.csr_matrix,
     nodes: np.ndarray,
     unknowns: np.ndarray,

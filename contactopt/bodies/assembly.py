@@ -11,8 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 import skfem
 
-from contactopt.bodies.elements import Trace, Weight, node_unknowns
+from contactopt.bodies.elements import Trace, Weight, node_unknowns, nodes_on
 from contactopt.bodies.motions import Motions
+from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.errors import InputError
 from contactopt.material import Material
@@ -37,6 +38,7 @@ class Matrices:
                    InputError if other unknowns are held or driven
     unknowns       (dim, nodes) those of every node;   locations  (dim, nodes) its coordinates
     surface_nodes  (m,) all nodes of the contact boundaries
+    facets         name of each contact boundary -> (f, j) nodes of its facets, corners first
     """
 
     name: str
@@ -59,11 +61,17 @@ class Matrices:
         def locations(self) -> np.ndarray: ...
         @property
         def surface_nodes(self) -> np.ndarray: ...
+        @property
+        def facets(self) -> Mapping[str, np.ndarray]: ...
 
     @property
     def contact_dofs(self) -> np.ndarray:
         """Displacement unknowns (m, dim) of all nodes of the contact boundaries."""
         return np.asarray(self.unknowns[:, self.surface_nodes].T)
+
+    def solver(self, system: System) -> BodySolver | None:
+        """Its own solver on free unknowns; None: one of contactopt.bodies.solvers."""
+        return None
 
     def stiffness_change(self, constant: str, U: np.ndarray) -> np.ndarray:
         """The derivative (n,) of the elastic forces by 'E' or 'nu' at fixed U."""
@@ -146,6 +154,13 @@ class Assembly(Matrices):
     def points(self) -> np.ndarray:
         """Coordinates of the contact nodes, (dim, k)."""
         return self.locations[:, self.nodes]
+
+    @property
+    def facets(self) -> Mapping[str, np.ndarray]:
+        known = self.basis.mesh.boundaries
+        return {
+            name: nodes_on(self.basis, self.degree, np.asarray(known[name])) for name in self.traces
+        }
 
     @cached_property
     def surface_nodes(self) -> np.ndarray:

@@ -7,8 +7,10 @@ are those of the whole body.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from typing import Any
 
 import numpy as np
 import skfem
@@ -53,7 +55,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
     basis = make_basis(straight(mesh) if scene.degree == 1 else mesh, scene.degree, kind.revolved)
     part = placed(scene, part, basis, weight)
     A = isotropic_stiffness(basis, kind.constants(part.material), weight)
-    fixed = _constrained(scene, part, basis)
+    fixed = _constraints(scene, part, basis).add_all()
     if fixed.held.all():
         raise InputError(
             f"body '{part.name}' is held at all its nodes, so that nothing of it deforms; hold"
@@ -96,7 +98,7 @@ def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> A
 def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     """The body with the loads of another scene; InputError if other unknowns are held or driven."""
     part = placed(scene, part, body.basis, body.weight)
-    fixed = _constrained(scene, part, body.basis)
+    fixed = _constraints(scene, part, body.basis).add_all()
     held = np.array_equal(np.flatnonzero(~fixed.held), body.free)
     if not held or not np.array_equal(fixed.motion, body.motion):
         raise InputError(
@@ -214,7 +216,7 @@ def face_of(
             f"body '{part.name}': the normals of {boundary!r} point around, and have no mean along"
             " which a bolt could pull; name a face with one side."
         )
-    held = _Constraints(scene, part, basis, np.zeros(basis.N), np.zeros(basis.N, dtype=bool))
+    held = _constraints(scene, part, basis)
     held.add_supports()
     fast = {c for c in scene.components if held.held[held.unknowns(boundary, c)].any()}
     fast |= {scene.components[0]} if scene.analysis.revolved else set()
@@ -283,16 +285,20 @@ def _mirrored_nodes(
 
 
 @dataclass
-class _Constraints:
+class Constraints:
     """What supports and plates do to the n unknowns of a body, one after the other.
 
-    held  (n,) mask of the unknowns that are not free;   columns  (n,) unit motion of each plate
-          component that moves. The others are as in Assembly.
+    numbers  (dim, nodes) the unknowns of each node
+    known    the boundaries, and nodes, the function from the name of one to the nodes on it
+    held     (n,) mask of the unknowns that are not free
+    columns  (n,) unit motion of each plate component that moves. The others are as in Assembly.
     """
 
     scene: Scene
-    part: Part
-    basis: skfem.CellBasis
+    part: Any
+    numbers: np.ndarray
+    known: Mapping[str, Any]
+    nodes: Callable[[str], np.ndarray]
     prescribed: np.ndarray
     held: np.ndarray
     columns: list[np.ndarray] = field(default_factory=list)
@@ -307,9 +313,8 @@ class _Constraints:
 
     def unknowns(self, boundary: str, component: str) -> np.ndarray:
         """Those of one component on a boundary."""
-        facets = np.asarray(self.basis.mesh.boundaries[boundary])
-        own = node_unknowns(self.basis)[self.scene.components.index(component)]
-        return np.unique(own[nodes_on(self.basis, self.scene.degree, facets)])
+        own = self.numbers[self.scene.components.index(component)]
+        return np.unique(own[self.nodes(boundary)])
 
     def hold(self, name: str, where: np.ndarray) -> None:
         """Let the support or plate of that name hold unknowns that nobody else holds."""
@@ -324,7 +329,7 @@ class _Constraints:
             if values is None:
                 values = dict.fromkeys(self.scene.components, 0.0)
             for component, value in values.items():
-                faces = support.faces(self.basis.mesh.boundaries)
+                faces = support.faces(self.known)
                 where = reduce(np.intersect1d, (self.unknowns(f, component) for f in faces))
                 if not len(where):
                     raise InputError(
@@ -364,11 +369,18 @@ class _Constraints:
                 )
             self.hold(f"plate '{plate.boundary}'", where)
 
+    def add_all(self) -> Constraints:
+        """Those of all supports and plates of the part."""
+        self.add_supports()
+        for load in self.part.loads:
+            if load.level:
+                self.add_plate(load)
+        return self
 
-def _constrained(scene: Scene, part: Part, basis: skfem.CellBasis) -> _Constraints:
-    made = _Constraints(scene, part, basis, np.zeros(basis.N), np.zeros(basis.N, dtype=bool))
-    made.add_supports()
-    for load in part.loads:
-        if load.level:
-            made.add_plate(load)
-    return made
+
+def _constraints(scene: Scene, part: Part, basis: skfem.CellBasis) -> Constraints:
+    def nodes(boundary: str) -> np.ndarray:
+        return nodes_on(basis, scene.degree, np.asarray(basis.mesh.boundaries[boundary]))
+
+    none = np.zeros(basis.N), np.zeros(basis.N, dtype=bool)
+    return Constraints(scene, part, node_unknowns(basis), basis.mesh.boundaries, nodes, *none)

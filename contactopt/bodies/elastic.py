@@ -252,14 +252,15 @@ def _solver(
 ) -> BodySolver:
     """A solver for the matrix on the kept unknowns, some of which may be eliminated last."""
     dofs, n = body.unknowns, len(body.load)
-    node, component, place = np.empty(n, int), np.empty(n, int), np.full(n, -1)
+    node, component, place = np.zeros(n, int), np.zeros(n, int), np.full(n, -1)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
     place[kept] = np.arange(len(kept))
     # Factors of A on these unknowns, or multigrid, which needs no copy of A.
     iterative = solver_type(name, len(kept), len(dofs)).iterative
     A = Block(whole, kept) if iterative else whole[kept][:, kept]
     last = None if trailing is None else place[trailing]
-    made = make_solver(name, System(A, node[kept], component[kept], body.locations, last))
+    system = System(A, node[kept], component[kept], body.locations, last)
+    made = body.solver(system) or make_solver(name, system)
     log.info("body '%s': %d unknowns, solver %s", body.name, A.shape[0], made.name)
     return made
 

@@ -104,12 +104,18 @@ def whole_motions(kind: Kind, basis: skfem.CellBasis) -> tuple[np.ndarray, tuple
     """All rigid motions of a body (n, m) as if nothing held it, and what each of them is."""
     unknowns, components = node_unknowns(basis), kind.components
     x = basis.doflocs[:, unknowns[0]]
-    labels = [f"translation along {component}" for component in components]
-    labels += [f"rotation in the {components[j]}-{components[i]} plane" for i, j in _planes(len(x))]
+    labels = motion_labels(components)
     R = np.zeros((basis.N, len(labels)))
     R[unknowns] = rigid_fields(x)
     one = slice(1, 2) if kind.revolved else slice(None)
-    return R[:, one], tuple(labels[one])
+    return R[:, one], labels[one]
+
+
+def motion_labels(components: tuple[str, ...]) -> tuple[str, ...]:
+    """What each of the motions of `rigid_fields` is."""
+    planes = [(components[j], components[i]) for i, j in _planes(len(components))]
+    turns = (f"rotation in the {first}-{second} plane" for first, second in planes)
+    return (*(f"translation along {component}" for component in components), *turns)
 
 
 def kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:

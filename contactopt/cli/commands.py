@@ -173,13 +173,15 @@ def check(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write a scene for another code: a deck of CalculiX, or its interface problem for FCLib."""
+    """Write a scene for another code: a deck of CalculiX, its interface problem for FCLib, or its
+    matrices.
+    """
     from contactopt.files.writing import whole_file
     from contactopt.runner import scene_of
 
     scene = scene_of(options.scene, **_arguments_of(options.set))
-    ending = {"calculix": "inp", "fclib": "hdf5"}[options.to]
-    path = Path(options.out or f"out/{Path(options.scene).stem}.{ending}")
+    ending = {"calculix": ".inp", "fclib": ".hdf5", "npz": ".npz", "mtx": "-matrices"}[options.to]
+    path = Path(options.out or f"out/{Path(options.scene).stem}{ending}")
     if options.to == "calculix":
         from contactopt.bodies.calculix_deck import deck
 
@@ -187,6 +189,12 @@ def export(options: argparse.Namespace) -> int:
         with whole_file(path) as file:
             file.write_text(text)
         told = f"a deck of CalculiX: ccx {path.with_suffix('')}"
+    elif options.to in ("npz", "mtx"):
+        from contactopt.coupling.matrices import write_matrices
+        from contactopt.coupling.reduction import reduce_bodies
+
+        write_matrices(reduce_bodies(scene), path, options.to)
+        told = "its matrices, which the page 'Bring your own matrices' explains"
     else:
         from contactopt.coupling.reduction import reduce
         from contactopt.fclib import write

@@ -330,7 +330,8 @@ def _way(
 
 def _on_ground(scene: Scene, bodies: Sequence[Body]) -> tuple[Body, ...]:
     """The bodies of a scene, thin ones among them on a soft ground."""
-    modulus = min(part.material.E for part in scene.parts if hasattr(part, "material"))
+    moduli = [part.material.E for part in scene.parts if hasattr(part, "material")]
+    modulus = min(moduli, default=0.0)
     made = each(lambda body: on_soft_ground(body, modulus), bodies, _parallel(bodies))
     for new, old in zip(made, bodies):
         if new is not old:

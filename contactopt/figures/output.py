@@ -15,11 +15,13 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from contactopt.bodies.given_matrices import GivenMatrices
 from contactopt.figures.style import FORMATS, save_figure
 from contactopt.outcome import Outcome, squeeze
 from contactopt.problem import alone, part_of
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.contact_fields import ContactFields, contact_fields, on_nodes
+from contactopt.scenes.scene import HalfSpace
 from contactopt.solving.follow import state_of
 from contactopt.solving.paths import PathResult
 from contactopt.solving.restart import FILE
@@ -61,7 +63,7 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
         first, couplings = part_of(problem, problem.pairs[0]), result.reduction.couplings
         picture = plots.deformed(result.scene, first, result.fields, couplings=couplings)
         save(picture.figure, "deformed")
-    if any(part.elastic and not part.meshed for part in result.scene.parts):
+    if any(isinstance(part, HalfSpace) for part in result.scene.parts):
         save(plots.maps_figure(result.reduction, result.solution), "maps")
     for pair in problem.pairs:
         name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
@@ -79,6 +81,11 @@ def write(result: Outcome, folder: Path) -> None:
     surfaces = contact_fields(result.reduction, result.solution)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
+    displaced = result.reduction.displaced(result.solution)
+    for body, B, U in zip(result.reduction.bodies, result.reduction.maps, displaced):
+        if isinstance(body.view, GivenMatrices):
+            force = B.T @ result.solution.reactions.ravel()
+            body.view.write_vtu(folder / f"{body.name}.vtu", U, force)
     for surface in surfaces:
         surface.write_vtu(folder / f"contact-{surface.name}.vtu")
     problem, r = result.problem, result.solution.reactions

@@ -108,7 +108,7 @@ def _faint_loads(scene: Scene, part: Part) -> list[str]:
 
 def _stiffness(scene: Scene) -> list[str]:
     """Young's moduli that no solid has, or that are far from each other."""
-    elastic: list[Any] = [part for part in scene.parts if part.elastic]
+    elastic: list[Any] = [part for part in scene.parts if hasattr(part, "material")]
     notes, unit = [], scene.units[1]
     for part in elastic if unit in STRESSES else ():
         E = part.material.E * STRESSES[unit]

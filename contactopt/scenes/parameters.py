@@ -175,7 +175,10 @@ class Parameter:
         if self.kind == "mu":
             return "its contacts have no friction"
         if self.kind in MATERIAL:
-            return f"body '{self.owner}' is rigid" if self.owner else "it has no elastic body"
+            if not self.owner:
+                return "it has no elastic body"
+            rigid = self.owner in scene.rigid
+            return f"body '{self.owner}' {'is rigid' if rigid else 'has matrices and no material'}"
         whose = f"body '{self.owner}'" if self.owner else "it"
         return f"{whose} has no such {self.kind}"
 

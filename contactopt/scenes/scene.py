@@ -24,6 +24,7 @@ from contactopt.scenes.loads.plate import Plate
 from contactopt.scenes.loads.pressure import Pressure
 from contactopt.scenes.loads.traction import Traction
 from contactopt.scenes.material_library import STRESSES
+from contactopt.scenes.matrix_part import MatrixPart
 
 __all__ = [
     "BodyForce",
@@ -77,8 +78,8 @@ class Scene:
     """
 
     name: str
-    upper: Body | None = None
-    lower: Body | None = None
+    upper: Body | MatrixPart | None = None
+    lower: Body | MatrixPart | None = None
     mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] | None = None
     kind: str = "plane-strain"
     thickness: float = 1.0
@@ -89,7 +90,7 @@ class Scene:
     zone: float | None = None
     units: tuple[str, str] = ("length", "stress")
     reference: Any = field(default=None, compare=False)
-    bodies: tuple[Body, ...] = ()
+    bodies: tuple[Body | MatrixPart, ...] = ()
     contacts: tuple[Contact, ...] = ()
     mirror: str | None = None
     state: str = ""
@@ -102,9 +103,10 @@ class Scene:
             raise self._wrong(f"unknown kind {self.kind!r}; choose from {', '.join(KINDS)}.")
         self._check_form()
         for part in self.parts:
-            if not isinstance(part, Body):
+            if not isinstance(part, Body | MatrixPart):
                 raise self._wrong(
-                    f"a body must be a Part, a Rigid or a HalfSpace; got {short(part)}."
+                    "a body must be a Part, a MatrixPart, a Rigid or a HalfSpace; got"
+                    f" {short(part)}."
                 )
         if bolts is not None:
             self._put(bolts)
@@ -148,7 +150,7 @@ class Scene:
         return "; ".join(dict.fromkeys(pair.friction for pair in self.pairs))
 
     @property
-    def parts(self) -> tuple[Body, ...]:
+    def parts(self) -> tuple[Body | MatrixPart, ...]:
         """The bodies; in the short form the upper one first."""
         if self.upper is None or self.lower is None:
             return self.bodies

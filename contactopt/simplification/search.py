@@ -41,7 +41,7 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
     if not isinstance(scene, Scene):
         raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")
     if not has_meshes(scene):
-        told = "Half-spaces have no mesh, and nothing that could be left out."
+        told = "Bodies without a mesh have nothing that could be left out."
         return Simplified(scene, scene, (), (told,))
     if not solve:
         found, notes = next(_chains(whole_of(scene)))

@@ -87,7 +87,6 @@ def report(made: dict[str, list[Row]]) -> None:
         most=most["all models"],
         meshes=most["meshes"],
         runs=len(made[TABLE]),
-        scenes=len({row["scene"] for row in made["front"]}),
     )
     for name in ("front", "rule", "peers"):
         text = text.replace(f"[{name}]", markdown(made[name]))

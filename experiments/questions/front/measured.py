@@ -16,7 +16,7 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.readings.quantities import value_of
 from contactopt.solving.solve_scene import Options, Solved
 from contactopt.solving.zone import solve_zone
-from experiments.questions.front.models import FINEST, Model, rough_scene
+from experiments.questions.front.models import FINEST, WAVES, Model, rough_scene
 
 Row = dict[str, Any]
 QUANTITIES = ("peak", "width", "stick", "approach", "force", "area")
@@ -76,7 +76,7 @@ def at_nodes(found: Solved) -> dict[str, float]:
 @cache
 def truth_of_rough() -> dict[str, float]:
     """The rough surface on its finest grid."""
-    return read(solved(rough_scene(64), FINEST, 1e-8, "auto"), "fitted")
+    return read(solved(rough_scene(WAVES), FINEST, 1e-8, "auto"), "fitted")
 
 
 def truth(model: Model, scene: Scene) -> dict[str, float]:

@@ -31,11 +31,11 @@ from experiments.questions.half_spaces.rough import LENGTH, gap_of, pressed
 
 LINEAR, QUADRATIC = (2, 3, 4, 6, 8, 12, 16, 24, 32), (1, 2, 3, 4, 6, 8, 12, 16)
 POINTS = (3, 4, 6, 8, 12, 16, 24, 32, 48)  # of a half-space, across the half-width of contact
-SOLID, GRID = (2, 3, 4, 6), (128, 160, 192, 256, 384, 512)
+SOLID, GRID = (2, 3, 4, 6), (48, 64, 96, 128, 192, 256)
 FEW = (4, 8, 16)  # meshes of models that are wrong
 PLANE, DISC = "plane-strain", "axisymmetric"
 SMALL = 4.0  # size of a body that is too small to be a half-space, over the half-width of contact
-FINEST = 1024  # points along a side of the rough surface that the others are compared with
+WAVES, FINEST = 16, 512  # waves and points along a side of the finest rough surface
 
 
 @dataclass(frozen=True)
@@ -173,9 +173,9 @@ def press_fit() -> list[Model]:
 
 
 def rough_scene(waves: int, law: str = "frictionless") -> Scene:
-    """A rough surface of up to 64 waves a side, of which those above `waves` are left out."""
-    wanted = pressed("rough", FINEST, law)
-    gap = gap_of("rough", FINEST)
+    """A rough surface of up to WAVES a side, of which those above `waves` are left out."""
+    wanted = pressed("wavy", FINEST, law)
+    gap = gap_of("wavy", FINEST)
 
     def points(n: int, zone: float | None) -> Any:
         ticks = (np.arange(n) + 0.5) * LENGTH / n - LENGTH / 2
@@ -199,16 +199,18 @@ def rough_scene(waves: int, law: str = "frictionless") -> Scene:
 
     tool = replace(wanted.upper, gap=shape)
     body = replace(wanted.lower, points=points)
-    return replace(wanted, upper=tool, lower=body, reference=None, elements=256)
+    return replace(wanted, upper=tool, lower=body, reference=None, elements=128)
 
 
 def rough() -> list[Model]:
     """A rough surface; its answer is that on the finest grid."""
     name = "rough surface"
     return [
-        Model(name, "half-space", partial(rough_scene, 64), GRID),
-        Model(name, "half-space, half the waves", partial(rough_scene, 32), GRID[:-2], "body"),
-        Model(name, "half-space, mu = .3", partial(rough_scene, 64, "coulomb"), (128,), "law"),
+        Model(name, "half-space", partial(rough_scene, WAVES), GRID),
+        Model(
+            name, "half-space, half the waves", partial(rough_scene, WAVES // 2), GRID[1::2], "body"
+        ),
+        Model(name, "half-space, mu = .3", partial(rough_scene, WAVES, "coulomb"), (96,), "law"),
     ]
 
 

@@ -1,0 +1,1 @@
+"""Bridges to other codes: each assembles the same block, and hands over its stiffness."""

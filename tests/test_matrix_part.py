@@ -1,0 +1,453 @@
+"""A body given by its matrices stands wherever one with a mesh does.
+
+Its matrices are assembled here with scikit-fem alone, so that they know nothing of ours.
+"""
+
+from dataclasses import replace
+
+import meshio
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import skfem
+from scipy.io import mmread
+from scipy.sparse.linalg import splu
+from scipy.spatial import KDTree
+from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+from contactopt import (
+    HalfSpace,
+    InputError,
+    Material,
+    MatrixPart,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    follow,
+    gradient,
+    reduce,
+    reduce_bodies,
+    run,
+    scenes,
+    simplify,
+    solve,
+)
+from contactopt.coupling.matrices import write_matrices
+
+E, NU = 70.0, 0.3
+SIMPLEX = {2: skfem.MeshTri, 3: skfem.MeshTet}
+BRICK = {2: skfem.MeshQuad, 3: skfem.MeshHex}
+ELEMENTS = {
+    (skfem.MeshTri, 1): skfem.ElementTriP1, (skfem.MeshTri, 2): skfem.ElementTriP2,
+    (skfem.MeshQuad, 1): skfem.ElementQuad1, (skfem.MeshTet, 1): skfem.ElementTetP1,
+    (skfem.MeshTet, 2): skfem.ElementTetP2, (skfem.MeshHex, 1): skfem.ElementHex1,
+    (skfem.MeshHex, 2): skfem.ElementHex2,
+}  # fmt: skip
+
+
+def block(kind, cells, low, high, contact):
+    """A mesh of a block with the boundaries contact and far, below or above."""
+    dim = len(low)
+    mesh = kind.init_tensor(*(np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells)))
+    ends = {"contact": low, "far": high} if contact == "below" else {"contact": high, "far": low}
+    level = {name: end[-1] for name, end in ends.items()}
+    return mesh.with_boundaries(
+        {name: lambda x, y=y: np.isclose(x[dim - 1], y) for name, y in level.items()}
+    )
+
+
+def matrices(mesh, degree, load=None):
+    """K, f under a traction on far, points, order and facets, by scikit-fem alone."""
+    dim = len(mesh.p)
+    element = skfem.ElementVector(ELEMENTS[type(mesh), degree]())
+    basis = skfem.Basis(mesh, element, intorder=2 * degree)
+    K = linear_elasticity(*lame_parameters(E, NU)).assemble(basis)
+    faces = skfem.FacetBasis(mesh, element, facets=mesh.boundaries["far"], intorder=6)
+    load = np.zeros(dim) if load is None else np.asarray(load)
+    f = skfem.LinearForm(lambda v, w: sum(load[i] * v[i] for i in range(dim))).assemble(faces)
+    component = np.empty(basis.N, dtype=int)
+    for i in range(dim):
+        component[basis.get_dofs(elements=True).all([f"u^{i + 1}"])] = i
+    order = np.stack([np.flatnonzero(component == i) for i in range(dim)], axis=1)
+    points = basis.doflocs[:, order[:, 0]].T
+    order = np.stack([own[KDTree(basis.doflocs[:, own].T).query(points)[1]] for own in order.T], 1)
+    facets = {}
+    for name, own in mesh.boundaries.items():
+        corners = mesh.p[:, mesh.facets[:, own]]
+        parts = [corners]
+        if degree == 2:
+            after = np.roll(corners, -1, axis=1)
+            parts.append((corners + after)[:, : 1 if dim == 2 else None] / 2)
+            if corners.shape[1] == 4:
+                parts.append(corners.mean(axis=1, keepdims=True))
+        places = np.concatenate(parts, axis=1)
+        facets[name] = KDTree(points).query(np.moveaxis(places, 0, -1))[1].T
+    return {"K": K, "f": f, "points": points, "order": order, "facets": facets}
+
+
+def pressed(dim, kind, degree, ratio=1, law="coulomb", t=0.0, forces=(), as_matrices=False):
+    """A block pressed on another by a plate, or by a traction; both as parts or by matrices."""
+    n = 3 if dim == 2 else 2 if degree == 1 else 1
+    top = block(kind, [n] * dim, [-0.5] * (dim - 1) + [0.0], [0.5] * (dim - 1) + [0.8], "below")
+    cells, wide = [n if ratio == 1 else 2 * n] * (dim - 1) + [n], [ratio / 2] * (dim - 1)
+    bed = block(kind, cells, [*(-half for half in wide), -1.0], [*wide, 0.0], "above")
+    x, y = ("x", "y") if dim == 2 else ("x", "z")
+    plates = (Plate("far", {y: -1.0, x: t}),) if forces == () else ()
+    if as_matrices:
+        lower = matrices(bed, degree)
+        far = lower["order"][np.unique(lower["facets"]["far"])].ravel()
+        upper = MatrixPart("upper", loads=plates, **matrices(top, degree, forces or None))
+        lower = MatrixPart("lower", fixed=far, **lower)
+    else:
+        loads = plates or (Traction("far", forces),)
+        upper = Part("upper", top, Material(E, NU), loads=loads)
+        lower = Part("lower", bed, Material(E, NU), supports=(Support("far"),))
+    kind = "solid" if dim == 3 else "plane-strain"
+    mu = 0.4 if law == "coulomb" else 0.0
+    return Scene("pressed", upper, lower, mu, kind=kind, degree=degree, law=law)
+
+
+def compared(one, other):
+    """The largest differences of forces and displacements, relative to the largest."""
+    (a, r), (b, s) = one, other
+    found = [(r.reactions, s.reactions), *zip(a.displaced(r), b.displaced(s))]
+    return [np.abs(u - v).max() / np.abs(u).max() for u, v in found]
+
+
+CASES = [
+    (2, skfem.MeshTri, 1), (2, skfem.MeshQuad, 1), (2, skfem.MeshTri, 2), (3, skfem.MeshTet, 1),
+    (3, skfem.MeshHex, 1), (3, skfem.MeshTet, 2),
+    pytest.param(3, skfem.MeshHex, 2, marks=pytest.mark.slow),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("law", ["coulomb", "tied"])
+@pytest.mark.parametrize("ratio", [1, 1.5], ids=["matching", "mortar"])
+@pytest.mark.parametrize(("dim", "kind", "degree"), CASES)
+def test_matrices_of_another_code_give_the_same_answer(dim, kind, degree, ratio, law):
+    made = []
+    for as_matrices in (False, True):
+        scene = pressed(dim, kind, degree, ratio, law, 0.1, as_matrices=as_matrices)
+        reduction = reduce_bodies(scene, Q="explicit")
+        assert reduction.coupling.kind == ("matching" if ratio == 1 else "mortar")
+        made.append((reduction, solve(reduction.problem, tol=1e-13)))
+        assert made[-1][1].solved
+    assert max(compared(*made)) < 1e-10
+
+
+def test_a_floating_body_and_a_load_path():
+    paths = []
+    for as_matrices in (False, True):
+        loads = [(0.0, -1.0), (0.2, -1.0), (-0.2, -0.8)]
+        states = [
+            pressed(2, skfem.MeshTri, 1, 1, "coulomb", 0.0, t, as_matrices=as_matrices)
+            for t in loads
+        ]
+        paths.append(follow(states, Q="explicit", tol=1e-13))
+    for step in range(3):
+        one, other = (path.states[step] for path in paths)
+        pairs = zip(
+            (one.solution.reactions, *one.bodies), (other.solution.reactions, *other.bodies)
+        )
+        assert max(np.abs(u - v).max() / np.abs(u).max() for u, v in pairs) < 1e-9
+    histories = [path.history["energy_error"] for path in paths]
+    assert np.allclose(*histories, atol=1e-9)
+
+
+def given(**changes):
+    """The arguments of a block of ours, given by node, held below, with changes."""
+    mesh = block(skfem.MeshTri, [3, 3], [-1.0, -1.0], [1.0, 0.0], "above")
+    made = matrices(mesh, 1)
+    order = made.pop("order")
+    number = order.ravel()
+    made["K"], made["f"] = made["K"][number][:, number].tocsr(), made["f"][number]
+    far = np.unique(made["facets"]["far"])
+    made["fixed"] = np.concatenate([2 * far, 2 * far + 1])
+    return {**made, **changes}
+
+
+def solved_on(**changes):
+    """A rigid punch on it: its problem, reactions and displacements of the points."""
+    punch = Rigid("punch", force={"y": -1.0}, gap=lambda x: x[0] ** 2)
+    reduction = reduce_bodies(Scene("by matrices", punch, MatrixPart("bed", **changes), 0.3))
+    solution = solve(reduction.problem, tol=1e-12)
+    U = reduction.displaced(solution)[1]
+    return solution.reactions, reduction.bodies[1].view.at_points(U)
+
+
+def test_every_way_to_give_a_body_gives_the_same_answer():
+    base = given()
+    r, u = solved_on(**base)
+    n, fixed = len(base["f"]), base["fixed"]
+    free = np.setdiff1d(np.arange(n), fixed)
+    K, f = base["K"], base["f"]
+    by_component = np.arange(n).reshape(-1, 2).T.ravel()
+    shuffled = np.random.default_rng(0).permutation(n)
+    T = sp.identity(n, format="csr")[:, free]
+    factors = splu(K[free][:, free].tocsc())
+
+    def solves(load):
+        out = np.zeros(n)
+        out[free] = factors.solve(load[free])
+        return out
+
+    eliminated = K.tolil()
+    eliminated[fixed, :] = eliminated[:, fixed] = 0.0
+    eliminated[fixed, fixed] = 1.0
+    ways = {
+        "component": {
+            "K": K[by_component][:, by_component], "f": f[by_component],
+            "fixed": np.flatnonzero(np.isin(by_component, fixed)),
+        },
+        "numbers": {
+            "K": K[shuffled][:, shuffled], "f": f[shuffled],
+            "order": np.argsort(shuffled).reshape(-1, 2),
+            "fixed": np.flatnonzero(np.isin(shuffled, fixed)),
+        },
+        "points in columns": {"points": base["points"].T},
+        "supports": {"fixed": None, "supports": (Support("far"),)},
+        "values": {"fixed": dict.fromkeys(fixed.tolist(), 0.0)},
+        "left out": {"K": K[free][:, free], "f": f[free], "constraints": T, "fixed": None},
+        "left out by us": {"constraints": T, "fixed": None},
+        "eliminated": {"K": eliminated.tocsr()},
+        "dense": {"K": K.toarray()},
+        "turned facets": {"facets": {k: v[:, ::-1] for k, v in base["facets"].items()}},
+        "function": {
+            "K": solves, "order": "node",
+            "facets": {k: v[:, ::-1] for k, v in base["facets"].items()},
+        },
+    }  # fmt: skip
+    for name, changes in ways.items():
+        again = solved_on(**{**base, **changes})
+        assert np.allclose(again[0], r, atol=1e-10), name
+        assert np.allclose(again[1], u, atol=1e-10), name
+
+
+def test_multi_point_constraints_make_points_follow():
+    """The far side moves as one: as a plate that is glued to it does."""
+    base = given(fixed=None, f=None)
+    n, far = base["K"].shape[0], np.unique(base["facets"]["far"])
+    base["f"] = np.zeros(n)
+    base["f"][2 * far + 1] = 1.0 / len(far)
+    master, T = far[0], sp.identity(n, format="lil")
+    for i in far[1:]:
+        for c in (0, 1):
+            T[2 * i + c, 2 * i + c] = 0.0
+            T[2 * i + c, 2 * master + c] = 1.0
+    T = T.tocsr()[:, np.flatnonzero(np.asarray(T.sum(axis=0)).ravel())]
+    wall = Rigid("wall", gap=lambda x: 0.1 + x[0] ** 2)
+    plate = Plate("far", {"y": 1.0})
+    answers = []
+    for part in (
+        MatrixPart("bed", constraints=T, **base),
+        MatrixPart("bed", loads=(plate,), **{**base, "f": 0 * base["f"]}),
+    ):
+        fixed = {"fixed": [2 * master]} if part.constraints is not None else {}
+        part = MatrixPart(**{**{k: getattr(part, k) for k in (
+            "name", "K", "f", "points", "facets", "loads", "constraints")}, **fixed})  # fmt: skip
+        reduction = reduce_bodies(Scene("pulled", wall, part, 0.3))
+        solution = solve(reduction.problem, tol=1e-12)
+        answers.append(solution.reactions)
+    assert np.allclose(*answers, atol=1e-9) and np.abs(answers[0]).max() > 0.1
+
+
+def test_a_half_space_and_a_patch():
+    """Bodies by matrices lie on half-spaces as on other bodies; facets of 8 nodes carry a constant
+    pressure exactly.
+    """
+    base = given()
+    x = np.linspace(-1, 1, 7)
+    space = HalfSpace("space", Material(E, NU), (x,), force={"y": -1.0})
+    with pytest.raises(InputError, match="points must be those"):
+        reduce_bodies(Scene("on", space, MatrixPart("bed", **base), 0.3))
+    x = np.linspace(-1, 1, 4)
+    space = HalfSpace("space", Material(E, NU), (x,), force={"y": -1.0})
+    reduction = reduce_bodies(Scene("on", space, MatrixPart("bed", **base), 0.3))
+    assert solve(reduction.problem).solved
+
+
+def scaled_row(K, i, factor):
+    K = K.tolil()
+    K[i] = factor * K[i]
+    return K.tocsr()
+
+
+def added(K, i, j, value):
+    K = K.tolil()
+    K[i, j] += value
+    return K.tocsr()
+
+
+def isolated(K, i):
+    K = K.tolil()
+    K[i, :] = K[:, i] = 0.0
+    K[i, i] = 1.0
+    return K.tocsr()
+
+
+WRONG = {
+    "unsymmetric": (lambda a: {"K": scaled_row(a["K"], 20, 2.0)}, "K is not symmetric: entry"),
+    "rows of conditions": (lambda a: {"K": added(a["K"], 3, 9, 9.0)}, "K is not symmetric: entry"),
+    "sign": (lambda a: {"K": -a["K"]}, "turn its sign"),
+    "multiplier": (lambda a: {"K": added(a["K"], 20, 20, -600.0)}, "not positive semidefinite"),
+    "weakened": (lambda a: {"K": added(a["K"], 20, 20, -80.0)}, "is among its eigenvalues"),
+    "not square": (lambda a: {"K": a["K"][:-1]}, "K must be square"),
+    "empty": (lambda a: {"K": sp.csr_matrix((32, 32))}, "K must be square and not empty"),
+    "complex": (lambda a: {"K": a["K"] * 1j}, "K must be real"),
+    "nan in K": (lambda a: {"K": a["K"] * np.nan}, "K holds a number that is not finite"),
+    "text": (lambda a: {"K": "K.mtx"}, "must be an array of numbers"),
+    "f of another size": (lambda a: {"f": a["f"][:-2]}, "f needs 32 numbers"),
+    "f not finite": (lambda a: {"f": a["f"] + np.inf}, "loads f of body 'bed' holds"),
+    "K of fewer points": (
+        lambda a: {"K": a["K"][:-2, :-2], "f": a["f"][:-2], "fixed": [0, 1, 2]},
+        "K has 30 rows, but 16 points have 32 unknowns",
+    ),
+    "points of space": (
+        lambda a: {"points": np.pad(a["points"], ((0, 0), (0, 1)))}, "need 2 coordinates each"
+    ),
+    "points not finite": (lambda a: {"points": a["points"] * np.nan}, "points of body 'bed' holds"),
+    "another unit along x": (lambda a: {"points": a["points"] * [1e3, 1.0]}, "another unit along"),
+    "bent points": (lambda a: {"points": a["points"] ** 3}, "rotations of the points"),
+    "the wrong order": (lambda a: {"order": "component"}, "take that one, or 'auto'"),
+    "an unknown order": (lambda a: {"order": "by row"}, "order must be one of auto, node"),
+    "numbers twice": (lambda a: {"order": np.zeros((16, 2))}, "each number from 0 to 31 once"),
+    "no contact": (lambda a: {"facets": {"top": [[0, 1]]}}, "names 'contact'"),
+    "facets from 1": (
+        lambda a: {"facets": {"contact": a["facets"]["contact"] + 1}}, "need 1 subtracted"
+    ),
+    "facets of a solid": (lambda a: {"facets": {"contact": [[0, 1, 2, 3]]}}, "one row of 2, 3"),
+    "facets inside": (lambda a: {"facets": {"contact": [[5, 6], [9, 10]]}}, "inside the body"),
+    "a facet twice": (lambda a: {"facets": {"contact": [[3, 7], [7, 3]]}}, "a facet twice"),
+    "a point twice": (lambda a: {"facets": {"contact": [[3, 3]]}}, "a point twice"),
+    "a contact node fixed": (
+        lambda a: {"fixed": [*a["fixed"], *2 * a["facets"]["contact"][0, 0] + np.arange(2)]},
+        "held in all its components",
+    ),
+    "all fixed": (lambda a: {"fixed": np.arange(32)}, "held"),
+    "fixed beyond": (lambda a: {"fixed": [99]}, "from 0 to 31; got 99"),
+    "penalty": (lambda a: {"K": added(a["K"], 0, 0, 1e30), "fixed": None}, "by penalty"),
+    "rows left as ones": (
+        lambda a: {"K": isolated(a["K"], 0), "fixed": a["fixed"][a["fixed"] != 0]},
+        "which is what a boundary condition leaves there",
+    ),
+    "a point without an element": (
+        lambda a: {
+            "K": sp.block_diag([a["K"], sp.csr_matrix((2, 2))]).tocsr(),
+            "f": np.append(a["f"], [0, 0]), "points": np.append(a["points"], [[5.0, 5.0]], 0),
+        },
+        "leave out points that belong to no element",
+    ),
+    "a hinge": (
+        lambda a: {
+            "K": sp.block_diag([a["K"], sp.csr_matrix([[1.0, -1.0], [-1.0, 1.0]])]).tocsr(),
+            "f": np.append(a["f"], [0, 0]), "points": np.append(a["points"], [[5.0, 5.0]], 0),
+        },
+        "no stiffness against some motion",
+    ),
+    "motions that strain": (lambda a: {"motions": np.ones((32, 1))}, "motion 1 is not free"),
+    "constraints of another size": (
+        lambda a: {"constraints": sp.identity(30)}, "a row for each of the 32 unknowns"
+    ),
+    "a traction": (lambda a: {"loads": (Traction("far", (0, 1)),)}, "other loads belong in f"),
+    "a support nowhere": (lambda a: {"supports": (Support("left"),)}, "no facets 'left'"),
+    "a function that adds": (
+        lambda a: {"K": lambda load: load + 1.0, "order": "node"}, "does not solve K U = F"
+    ),
+    "a function of another size": (
+        lambda a: {"K": lambda load: load[:-1], "order": "node"}, "an array of shape"
+    ),
+    "a function without an order": (lambda a: {"K": lambda load: load}, "knows the numbering"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_input_that_lies_is_found(name):
+    change, said = WRONG[name]
+    base = given()
+    with pytest.raises(InputError, match=said.replace("(", r"\(")) as caught:
+        solved_on(**{**base, **change(base)})
+    assert str(caught.value).endswith(".") and str(caught.value).count(". ") == 0
+
+
+def test_what_needs_elements_is_refused_in_a_sentence():
+    scene = Scene("s", Rigid("wall", force={"y": -1.0}), MatrixPart("bed", **given()), 0.3)
+    for act, said in (
+        (lambda: gradient(run(scene), "approach", ["E:bed"]), "has matrices and no material"),
+        (lambda: run(scene, quantity="pressure", accuracy=0.1), "are as fine as they are"),
+    ):
+        with pytest.raises(InputError, match=said):
+            act()
+    assert "nothing that could be left out" in str(simplify(scene))
+    assert np.isfinite(gradient(run(scene), "approach", ["mu"]).by["mu"])
+
+
+def test_a_run_writes_displacements_and_pictures_of_the_contact(tmp_path):
+    base = given()
+    scene = Scene("s", Rigid("wall", force={"y": -1.0}), MatrixPart("bed", **base), 0.3)
+    result = run(scene, out=tmp_path)
+    assert result.solution.solved
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"bed.vtu", "pressure.png", "contact-wall-bed.csv", "summary.json"} <= names
+    made = meshio.read(tmp_path / "bed.vtu")
+    body, U = result.reduction.bodies[1], result.reduction.displaced(result.solution)[1]
+    assert np.allclose(made.point_data["displacement"][:, :2], body.view.at_points(U).T)
+    total = made.point_data["force"].sum(axis=0)
+    assert np.allclose(total[1:], [-1, 0], atol=1e-9)
+    assert np.allclose(made.point_data["reaction"].sum(axis=0) + total, 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("form", ["npz", "mtx"])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_what_export_writes_gives_the_same_problem(rigid, form, tmp_path):
+    """By dense algebra alone: u(r) = sum B U(r) + gap is Q r + V lambda + q for every r that
+    balances the loads; and as MatrixPart it reduces to the same problem.
+    """
+    out = tmp_path / "made"
+    scene = scenes.flat_punch(2, elements=4)
+    if rigid:
+        scene = replace(scene, upper=Rigid("punch", force={"y": -1.0}))
+    write_matrices(reduce_bodies(scene), out, form)
+    problem = reduce(scene)
+
+    def read(key):
+        if form == "mtx":
+            made = mmread(out / f"{key}.mtx")
+            return made.toarray() if sp.issparse(made) else made
+        with np.load(out) as file:
+            if key in file:
+                return file[key]
+            own = (file[f"{key}.{part}"] for part in ("data", "indices", "indptr"))
+            return sp.csr_matrix(tuple(own), file[f"{key}.shape"]).toarray()
+
+    q, V = read("q").ravel(), read("V").reshape(problem.q.size, -1)
+    s = read("s").ravel()
+    assert np.allclose(read("Q"), problem.Q) and np.allclose(V, problem.V)
+    r = np.random.default_rng(0).standard_normal(q.size)
+    r -= V @ np.linalg.lstsq(V.T @ V, V.T @ r + s, rcond=None)[0] if V.size else 0
+    u = 0 * r
+    for part in scene.meshed.values():
+        K, f, N, g, p, B = (read(f"{part.name}.{own}") for own in ("K", "f", "N", "g", "p", "B"))
+        f, g, p = f.ravel(), g.ravel(), p.ravel()
+        v = np.linalg.lstsq(N.T @ K @ N, N.T @ (f - K @ g + B.T @ r) + p, rcond=1e-12)[0]
+        u += B @ (g + N @ v)
+    gap = reduce_bodies(scene).gap
+    rest = problem.Q @ r + q - u
+    rest[:: problem.dim] -= gap
+    rest -= V @ np.linalg.lstsq(V, rest, rcond=None)[0] if V.size else 0
+    assert np.abs(rest).max() < 1e-9 * np.abs(u).max()
+    (part, *_) = scene.meshed.values()
+    N, K, f, g, p = (read(f"{part.name}.{own}") for own in ("N", "K", "f", "g", "p"))
+    load = N.T @ (f.ravel() - K @ g.ravel()) + p.ravel()
+    facets = {part.contact: read(f"{part.name}.facets.{part.contact}").astype(int)}
+    given = MatrixPart(
+        part.name, N.T @ K @ N, load, read(f"{part.name}.points"), facets, contact=part.contact,
+        order=read(f"{part.name}.unknowns"), constraints=sp.csr_matrix(N),
+    )  # fmt: skip
+    again = reduce(scene.with_parts(lambda own: given if own is part else own))
+    # the free motion of a plate is measured elsewhere, which moves Q along V
+    forces = [solve(own, tol=1e-13).reactions for own in (again, problem)]
+    assert np.allclose(*forces, atol=1e-10 * np.abs(forces[0]).max())
+    assert np.allclose(np.abs(again.s), np.abs(problem.s))
