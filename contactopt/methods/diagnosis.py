@@ -7,6 +7,8 @@ contact with friction slips in it (there it has u_n = mu |u_t|, Coulomb u_n = 0)
 and so is stick of all that touches if the rest opens by more than mu |u_t|; Q_nt = 0 is not. It is
 solved, and its answer certified for both problems. It needs a symmetric Q; where Q is singular it
 may have other minimisers, so that one that slips decides nothing.
+
+reports/atlas has the smallest problems on which methods fail, with the thresholds observed there.
 """
 
 from __future__ import annotations

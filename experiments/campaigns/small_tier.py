@@ -18,7 +18,7 @@ from contactopt.errors import InputError
 
 ACCURACY = 1e-6
 PEERS = ("siconos", "pinocchio", "cone")
-FEW = 5  # sequences below which a method's two starts are not compared
+FEW = 3  # sequences below which a method's two starts are not compared
 
 
 def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
