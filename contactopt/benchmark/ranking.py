@@ -213,7 +213,7 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
         "takes": [f"{n} of {all_}" for n, all_ in zip(found["taken"], found["problems"])],
         "CPU [s]": found["mean"],
         "wall [s]": found["wall mean"],
-        "bridge [s]": found["bridge"],
+        "bridge [s]": [f"{s:.3g}" if np.isfinite(s) else "" for s in found["bridge"]],
         "memory [MB]": found["memory"],
         "certificate / asked": found["over claim"],
     }
@@ -277,7 +277,7 @@ def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             rng.integers(len(logs), size=(BATCH, len(logs))) for _ in range(RESAMPLES // BATCH)
         )
         ranks = [rankdata(logs[index].mean(axis=1), method="min", axis=1) for index in drawn]
-    low, high = np.percentile(np.concatenate(ranks), LIKELY, axis=0)
+    low, high = np.nan_to_num(np.percentile(np.concatenate(ranks), LIKELY, axis=0))
     return np.floor(low).astype(int), np.ceil(high).astype(int)
 
 
@@ -293,7 +293,10 @@ def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
 
 
 def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The even and the odd repeats, two reruns of a table; a single repeat stands in both."""
+    """The even and the odd repeats of the problems that were run again, two reruns of a table; a
+    run that was made once stands in both.
+    """
+    table = table[table["problem"].isin(table.loc[table["repeat"] > 0, "problem"])]
     single = table.groupby(POINT)["repeat"].transform("size") == 1
     even = table["repeat"] % 2 == 0
     return table[even | single], table[~even | single]

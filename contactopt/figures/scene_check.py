@@ -27,6 +27,7 @@ from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.unbalanced_loads import escape, resisted, sentence
+from contactopt.readings.hertz_size import hertz
 from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
@@ -91,8 +92,15 @@ def check_scene(
             scene, part, body.body.basis.mesh if isinstance(body, AssembledElastic) else None
         )
         lines.append(f"  {count(body.unknowns, 'unknown')}; {_held(part, body.name, free)}")
+    predicted = hertz(scene, made, free)
     for pair, own in zip(scene.pairs, made.couplings):
         lines += _pair_lines(scene, pair, own)
+        if pair.name in predicted and scene.given:
+            sides = zip(pair.bodies, pair.surfaces)
+            face = next(
+                f"{b}:{s or scene.meshed[b].contact}" for b, s in sides if b in scene.meshed
+            )
+            lines += predicted[pair.name].words(length, face, float(own.areas.sum()))
     if scene.copies > 1:
         where = " and ".join(_direction(plane.inward) for plane in made.planes)
         where = where and f", across planes with normals {where}"

@@ -18,7 +18,7 @@ from contactopt.errors import InputError
 
 ACCURACY = 1e-6
 PEERS = ("siconos", "pinocchio", "cone")
-FEW = 5  # sequences below which a method's two starts are not compared
+FEW = 3  # sequences below which a method's two starts are not compared
 
 
 def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
@@ -30,17 +30,15 @@ def findings(table) -> list[str]:  # type: ignore[no-untyped-def]
     ]
     found += told(alone, leaders, repeats)
     found += [why] if (why := unranked(table)) else []
-    for dim, where in ((2, "in the plane"), (3, "in space")):
-        part = alone[(alone["dim"] == dim) & (alone["plates"] == 0)]
-        found += told(part, lambda rows, where=where: others(rows, where))
+    found += told(alone[alone["plates"] == 0], plane, space)
     return found + told(along, starts) + told(table, bridges)
 
 
 def leaders(table) -> str:  # type: ignore[no-untyped-def]
     select(table, method="auto")
     leaders = ranking(points(table), ACCURACY).set_index("method")
-    if "auto" not in leaders.index or not leaders.loc["auto", "of"] > 0:
-        return "No solver reached the certificate 1e-6 on a problem that all of them take."
+    if "auto" not in leaders.index or not leaders.loc["auto", "solved"] > 0:
+        return "`auto` reached the certificate 1e-6 on no problem that all solvers take."
     auto = leaders.loc["auto"]
     least = f"{auto['over the least']:.2g}"
     return (
@@ -50,15 +48,22 @@ def leaders(table) -> str:  # type: ignore[no-untyped-def]
 
 
 def repeats(table) -> str:  # type: ignore[no-untyped-def]
-    again = table["problem"].isin(table.loc[table["repeat"] > 0, "problem"])
-    part = table[again]
-    tau = agreement(*map(points, reruns(part)), ACCURACY) if len(part) else np.nan
+    part, other = reruns(table)
+    tau = agreement(points(part), points(other), ACCURACY) if len(part) else np.nan
     if not np.isfinite(tau):
         raise InputError("an order needs two solvers, each with even and odd repeats.")
     return (
         f"{part['problem'].nunique()} problems were run twice. Kendall's tau between the orders of"
         f" the first and of the second run is {tau:.2f}."
     )
+
+
+def plane(table) -> str:  # type: ignore[no-untyped-def]
+    return others(select(table, dim=2), "in the plane")
+
+
+def space(table) -> str:  # type: ignore[no-untyped-def]
+    return others(select(table, dim=3), "in space")
 
 
 def others(table, where: str) -> str:  # type: ignore[no-untyped-def]
