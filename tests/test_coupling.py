@@ -287,7 +287,9 @@ def test_a_kind_of_body_is_added_by_one_line(monkeypatch, form):
 def test_parts_of_no_known_kind_are_refused():
     from contactopt.bodies import assemble
 
-    with pytest.raises(InputError, match="must be one of Part, MatrixPart, Rigid, HalfSpace; got str"):
+    with pytest.raises(
+        InputError, match="must be one of Part, MatrixPart, Rigid, HalfSpace; got str"
+    ):
         assemble(two_blocks("plane-strain"), "block", 1, None)
 
 

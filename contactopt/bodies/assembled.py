@@ -69,8 +69,6 @@ class Surface:
               to the displacement of its contacts in that component
     held      (dim, k) whether that component of the contact's displacement is prescribed
     cells     (v, c) contacts at the corners of the c linear cells that cover the surface
-    alone     as the traces, of the nodes at the contacts by themselves; None where these are the
-              traces
     mesh      the finite elements behind it; None for a body that has none
     chart     places of the contacts on the surface, where the body knows them and its normals are
               all the same
@@ -85,7 +83,6 @@ class Surface:
     traces: tuple[sp.csr_matrix, ...]
     held: np.ndarray
     cells: np.ndarray
-    alone: tuple[sp.csr_matrix, ...] | None = None
     mesh: Mesh | None = None
     chart: Chart | None = None
 

@@ -11,8 +11,9 @@ import scipy.sparse as sp
 from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import build_body
+from contactopt.bodies.corners import smooth_tilts
 from contactopt.bodies.elastic import ElasticBody, condense
-from contactopt.bodies.elements import Trace, mean_normals
+from contactopt.bodies.elements import mean_normals
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.bodies.thickness import thin_facets
@@ -20,7 +21,6 @@ from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve, check_curve
 from contactopt.scenes.scene import Part, Scene
 
-Traces = tuple[sp.csr_matrix, ...]
 PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
 
 
@@ -87,7 +87,7 @@ class AssembledElastic(AssembledBody):
             places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
-        traces, alone = traces_of(trace, unknowns, len(held))
+        tilts = smooth_tilts(trace.normals, trace.cells)
         return Surface(
             body.name,
             body.locations[:, trace.nodes],
@@ -95,10 +95,12 @@ class AssembledElastic(AssembledBody):
             trace.areas,
             trace.weights[:, nodes],
             places,
-            traces,
+            tuple(
+                trace_of(trace.weights, trace.nodes, row, held, along)
+                for row, along in zip(unknowns, np.abs(trace.normals) <= tilts)
+            ),
             held[unknowns[:, trace.nodes]],
             trace.cells,
-            alone,
             self._mesh(name, held, curve),
         )
 
@@ -139,22 +141,25 @@ class AssembledElastic(AssembledBody):
         return condense(self.body, solver, entries)
 
 
-def traces_of(trace: Trace, unknowns: np.ndarray, n: int) -> tuple[Traces, Traces | None]:
-    """The displacement of the contacts (k,) in terms of all n unknowns of a body, component by
-    component, where its nodes have the unknowns (dim, nodes); and that of the nodes at the contacts
-    alone, None where it is the same.
+def trace_of(
+    weights: sp.csr_matrix,
+    nodes: np.ndarray,
+    unknowns: np.ndarray,
+    held: np.ndarray,
+    along: np.ndarray,
+) -> sp.csr_matrix:
+    """One component of the displacement of the contacts (k,) in terms of all unknowns (n,), by
+    their rows of the weights. Where it is prescribed at the contact node, and `along` the surface
+    (k,), it is that of the node alone: the weights of a neighbour and of its mirror image cancel
+    each other there. Pressure needs the whole of a component across the surface.
     """
-    k = len(trace.nodes)
-    own = sp.csr_matrix((np.ones(k), (np.arange(k), trace.nodes)), trace.weights.shape)
-
-    def of(weights: sp.csr_matrix) -> Traces:
-        part = sp.coo_matrix(weights)
-        made = [sp.csr_matrix((part.data, (part.row, row[part.col])), (k, n)) for row in unknowns]
-        for each in made:
-            each.eliminate_zeros()
-        return tuple(made)
-
-    return of(trace.weights), of(own) if abs(trace.weights - own).max() else None
+    k = len(nodes)
+    alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
+    prescribed = sp.diags((held[unknowns[nodes]] & along).astype(float))
+    part = sp.coo_matrix(weights - prescribed @ (weights - alone))
+    trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (k, len(held)))
+    trace.eliminate_zeros()
+    return trace
 
 
 def assemble_elastic(

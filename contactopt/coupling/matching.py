@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import permutations
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody, Surface
+from contactopt.bodies.corners import turns
 from contactopt.bodies.elements import opposed, unit
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, guided, local_map, of_contacts
-from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, normals_in_planes
+from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes
 from contactopt.coupling.segments import FACING
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
@@ -63,29 +63,12 @@ def couple_nodes(
         apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
         points = replace(points, normals=normals, gap=np.sum(normals * apart.T, axis=0))
     _, frames, order = laid_out = _laid_out(scene, lead, points)
-    seen = np.empty_like(normals)
-    seen[:, partner] = normals
-    theirs = local_map(_traces(first, seen), partner[order], frames)
-    ours = local_map(_traces(second, normals), order, frames)
+    theirs = local_map(first.traces, partner[order], frames)
+    ours = local_map(second.traces, order, frames)
     maps = guided(theirs, frames, held[:, order]), guided(ours, frames, held[:, order])
     side = "lower" if lower.meshed else "upper"
     made = of_contacts("matching", side, points, laid_out, maps)
     return replace(made, conforming=conforming)
-
-
-def _traces(surface: Surface, normals: np.ndarray) -> tuple[sp.csr_matrix, ...]:
-    """The traces of the contacts of a surface. A component across the normal (dim, k) that is held
-    at a contact's node is that of this node alone: on a plane of symmetry the weights of a
-    neighbour and of its mirror image cancel each other. Along the normal a contact passes its
-    force on to all nodes around, so that a constant pressure stays one.
-    """
-    if surface.alone is None:
-        return surface.traces
-    single = surface.held & (np.abs(normals) <= NEAR)
-    return tuple(
-        sp.csr_matrix(trace - sp.diags(held.astype(float)) @ (trace - alone))
-        for trace, alone, held in zip(surface.traces, surface.alone, single)
-    )
 
 
 def _conforming(cells: np.ndarray, others: np.ndarray, partner: np.ndarray) -> bool:
@@ -126,7 +109,6 @@ def _without_copies(surface: Surface, outward: np.ndarray) -> Surface:
         areas=areas,
         weights=sp.csr_matrix(M @ surface.weights),
         traces=tuple(sp.csr_matrix(M @ trace) for trace in surface.traces),
-        alone=surface.alone and tuple(sp.csr_matrix(M @ trace) for trace in surface.alone),
         held=surface.held[:, first],
         cells=own[surface.cells],
     )
@@ -186,10 +168,7 @@ def _turn(surface: Surface) -> np.ndarray:
     """(k,) twice the largest difference between the normal at a contact and those next to it: a
     bound on the error of normals, which are means over facets.
     """
-    turn, normals = np.zeros(surface.points.shape[1]), surface.normals
-    for corner, other in permutations(surface.cells, 2):
-        apart = np.linalg.norm(normals[:, corner] - normals[:, other], axis=0)
-        np.maximum.at(turn, corner, apart)
+    turn = turns(surface.normals, surface.cells)
     return np.where(turn > 1e-12, 2 * turn, 0.0)
 
 

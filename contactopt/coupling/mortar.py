@@ -78,7 +78,7 @@ from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.elements import FACES, weight_at
 from contactopt.checks import place_words
-from contactopt.coupling.faces import Faces, cross, evaluate
+from contactopt.coupling.faces import NEWTON, Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
 from contactopt.coupling.mortar_matrices import collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
@@ -86,8 +86,6 @@ from contactopt.errors import InputError
 
 NUDGE = 0.05  # of the way to the centre of a face: about the first point of integration on it
 OVERLAP = 1e-9  # initial overlap, over the extent of the contact surface, that is reported
-
-ON_FACE = 1e-9  # reference coordinates outside of a face by less lie on it, but for rounding
 
 _log = logging.getLogger(__name__)
 
@@ -267,52 +265,34 @@ def _alone(
     inward = NUDGE * (_centres(own)[:, nodes] - x)
     places = own.locations(points.cell // len(own.cells), points.at)[0]
     near = KDTree(places.T).query((x + inward).T)[1]
-    there = _seen_from(other, points, x, normals[:, nodes], near)
-    beside = _outside(other, there)
-    # the nearest point may lie on a face beside that on which the node lies
-    contact, face = _faces_around(own, points, nodes, beside > ON_FACE)
-    tried = _seen_from(other, points, x[:, contact], normals[:, nodes[contact]], face)
-    off = _outside(other, tried)
-    order = np.lexsort((off, contact))
-    best = order[np.unique(contact[order], return_index=True)[1]]
-    best = best[off[best] < beside[contact[best]]]
-    near[contact[best]], there[:, contact[best]] = face[best], tried[:, best]
-    there = np.clip(there, 0.0, 1.0)
-    if other.corners == 3:
-        there /= np.maximum(there.sum(axis=0), 1.0)
-    N, row = other.shapes(there).T[:, None], np.arange(k)[:, None]
-    theirs = collect(N, row, other.faces[points.face[near]], (k, other.points.shape[1]))
+    n, axes = normals[:, nodes].T[:, None], points.axes[near]
+    axes = axes - np.sum(axes * n, axis=2, keepdims=True) * n
+    face = points.face[near]
+    there, off = _on_face(other, face, x, axes, points.there[:, near])
+    # The face of the nearest point of integration need not be the one that the node sees.
+    around = other.around()
+    lost = np.flatnonzero(off > NEWTON)
+    beside = sp.coo_array(around[face[lost]] @ around.T)
+    row, tried = lost[beside.row], beside.col
+    middle = np.full(other.dim - 1, 1 / other.corners if other.corners == 3 else 0.5)
+    start = np.repeat(middle[:, None], len(row), axis=1)
+    places, missed = _on_face(other, tried, x[:, row], axes[row], start)
+    order = np.lexsort((-missed, row))  # of each contact the best face comes last, and stays
+    order = order[missed[order] < off[row[order]]]
+    face[row[order]], there[:, row[order]] = tried[order], places[:, order]
+    N = other.shapes(there).T[:, None]
+    theirs = collect(N, np.arange(k)[:, None], other.faces[face], (k, other.points.shape[1]))
     return mine, tidy(theirs)
 
 
-def _seen_from(
-    other: Faces, points: Overlap, x: np.ndarray, normals: np.ndarray, near: np.ndarray
-) -> np.ndarray:
-    """Reference coordinates (dim - 1, m) of the places that x (dim, m) sees along its normals, on
-    the other side's faces at the points of integration `near` (m,).
-    """
-    n, axes = normals.T[:, None], points.axes[near]
-    axes = axes - np.sum(axes * n, axis=2, keepdims=True) * n
-    return other.locate(points.face[near], x, axes, points.there[:, near])
-
-
-def _outside(surface: Faces, at: np.ndarray) -> np.ndarray:
-    """How far (m,) reference coordinates (dim - 1, m) lie outside of the faces; 0 on them."""
-    least = np.maximum(-at, 0.0).max(axis=0)
-    most = at.sum(axis=0) if surface.corners == 3 else at.max(axis=0)
-    return np.asarray(np.maximum(least, most - 1.0))
-
-
-def _faces_around(
-    own: Faces, points: Overlap, nodes: np.ndarray, chosen: np.ndarray
+def _on_face(
+    surface: Faces, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Pairs of a chosen contact and a point of integration, one for every face of the other side
-    that the faces around the contact's node look at.
+    """Where faces (m,) see points x (dim, m), moved onto them, and by how much: reference
+    coordinates (dim - 1, m), and (m,).
     """
-    contact = np.full(own.points.shape[1], -1)
-    contact[nodes[chosen]] = np.flatnonzero(chosen)
-    around = contact[own.faces[points.cell // len(own.cells)]]
-    point, corner = np.nonzero(around >= 0)
-    pairs = np.stack([around[point, corner], points.face[point]])
-    pairs, first = np.unique(pairs, axis=1, return_index=True)
-    return pairs[0], point[first]
+    seen = surface.locate(face, x, axes, start)
+    there = np.clip(seen, 0.0, 1.0)
+    if surface.corners == 3:
+        there /= np.maximum(there.sum(axis=0), 1.0)
+    return there, np.abs(there - seen).max(axis=0)

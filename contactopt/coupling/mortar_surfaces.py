@@ -9,16 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody, Mesh, Surface
+from contactopt.bodies.corners import smooth_tilts
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, guided, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import Mortar, contact_normals, mortar
-from contactopt.coupling.planes_of_symmetry import (
-    NEAR,
-    ContactPoints,
-    smooth_across,
-    symmetry_planes,
-)
+from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
 from contactopt.errors import InputError
 from contactopt.meshes.curves import KINK
 from contactopt.scenes.contact import SIDES, Contact
@@ -60,16 +56,15 @@ def couple_surfaces(
     number[m.nodes] = np.arange(len(m.nodes))
     cells = number[carrier.cell_nodes()]
     cells = cells[np.all(cells >= 0, axis=1)].T  # those whose corners all carry contacts
+    along = own_held & (np.abs(m.normals) <= smooth_tilts(m.normals, cells))
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
     laid_out = lay_out(contacts, scene.copies, scene.analysis.revolved)
     _, frames, order = laid_out
-    # along its normal a contact passes its force on to all nodes around
-    single = own_held & (np.abs(m.normals) <= NEAR)
     maps = []
     for i, mesh in enumerate(meshes):
         traces = [
             sp.csr_matrix(sum(part @ picked for part, picked in zip(row, mesh.picked)))
-            for row in m.components(i, single)
+            for row in m.components(i, along)
         ]
         maps.append(guided(local_map(traces, order, frames), frames, contacts.held[:, order]))
     side = SIDES[m.own]
@@ -144,10 +139,7 @@ def _faces(name: str, m: Mesh) -> Faces:
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
     """Both surfaces with the nodes that lie in a plane of symmetry of both."""
-    planes = []
-    for contacts in map(_vertices, sides, meshes):
-        found = symmetry_planes(contacts)
-        planes.append([plane for plane in found if smooth_across(contacts, plane)])
+    planes = [symmetry_planes(_vertices(side, mesh)) for side, mesh in zip(sides, meshes)]
     size = max(float(np.ptp(side.points[:, np.unique(side.faces)], axis=1).max()) for side in sides)
     common = [
         plane

@@ -8,13 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.bodies.assembled import Guides
+from contactopt.bodies.corners import smooth_tilts
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 
-# A polygon in a circle leaves its plane of symmetry with half of the slope of its second vertex or
-# less, or .8 of it where the second facet has a quarter of the length of the first; a plane with
-# all of it.
-EDGE = 0.85
 NEAR = 1e-9  # what counts as zero beside the size of a surface or of all bodies, or beside one
 
 
@@ -57,7 +54,10 @@ class SymmetryPlane:
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """The planes, at most one per component, on which exactly this component is held."""
+    """The planes, at most one per component, on which exactly this component is held, and which the
+    surface crosses smoothly: a slanted one has an edge there, and each side its own normal.
+    """
+    tilts = smooth_tilts(contacts.normals, contacts.cells)
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, mask in enumerate(held):
         if not mask.any():
@@ -65,7 +65,7 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
         offset = float(points[c, mask].mean())
         plane = np.abs(points[c] - offset) <= NEAR * contacts.size
         side = np.sign(points[c, ~plane] - offset)
-        tangential = np.all(np.abs(normals[c, plane]) < 0.5)
+        tangential = np.all(np.abs(normals[c, plane]) <= tilts[plane])
         # along the normal, at least
         moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)
         if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):
@@ -73,31 +73,10 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
     return planes
 
 
-def smooth_across(contacts: ContactPoints, plane: SymmetryPlane) -> bool:
-    """Whether a surface crosses the plane at a right angle, but for the slope of its facets. Else
-    it has an edge there, such as a slanted plane, and keeps its own normals.
-    """
-    within = plane.contains(contacts.points, contacts.size)
-    slope = np.abs(plane.inward @ contacts.normals)
-    reached, beside = within, np.zeros(0, dtype=int)
-    for _ in range(2):  # two cells: the halves of a quadratic facet have one normal
-        around = np.unique(contacts.cells[:, reached[contacts.cells].any(axis=0)])
-        further = around[~reached[around]]
-        beside = further if len(further) else beside
-        reached = reached | np.isin(np.arange(len(slope)), around)
-    return bool(
-        not beside.size
-        or slope[within].max(initial=0.0) <= NEAR
-        or slope[within].mean() <= EDGE * slope[beside].mean()
-    )
-
-
 def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
     """Unit normals (dim, k) that lie in the planes at their contacts, as with mirror images."""
     normals = contacts.normals
     for plane in symmetry_planes(contacts):
-        if not smooth_across(contacts, plane):
-            continue
         out = plane.inward @ normals
         straight = normals - plane.inward[:, None] * out
         straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
