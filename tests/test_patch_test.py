@@ -7,7 +7,17 @@ import pytest
 import turned
 from mortar_scenes import press_fit
 
-from contactopt import Contact, Material, Part, Scene, Support, Traction, reduce_bodies, run
+from contactopt import (
+    Contact,
+    Material,
+    Part,
+    Pressure,
+    Scene,
+    Support,
+    Traction,
+    reduce_bodies,
+    run,
+)
 from contactopt.coupling import coupling as seam
 from contactopt.coupling.patch_test import misfit
 from contactopt.figures.scene_check import check_scene
@@ -62,6 +72,68 @@ def test_nodes_that_match_without_their_facets_pass_a_constant_pressure_on(shape
     assert made.kind == "mortar" and "the nodes match, but a constant pressure" in made.why
     assert not result.summary["remarks"]
     assert result.summary["pairs"]["upper-lower"]["coupled_because"] == made.why
+
+
+def trapezium(low: float, high: float, rise: float, cells: int, shape: str):
+    """A block 1 wide whose face at the height 1 rises by `rise`."""
+    grid = np.linspace(0.0, 1.0, cells + 1)
+    mesh = tensor_mesh(grid, low + (high - low) * grid)
+    mesh = rename(mesh, left="x-", right="x+", bottom="y-", top="y+")
+    mesh = simplices(mesh) if shape == "triangles" else mesh
+    x, y = mesh.p
+    p = np.stack([x, y + rise * x * (1 - abs(y - 1))])
+    return replace(mesh, doflocs=p)
+
+
+@pytest.mark.parametrize("law", ["coulomb", "frictionless"])
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("rise", [0.01, -0.5])
+@pytest.mark.parametrize("shapes", ["triangles", "quadrilaterals"])
+@pytest.mark.parametrize("cells", [(3, 3), (4, 3)])
+def test_a_slanted_surface_that_ends_on_rollers(law, degree, rise, shapes, cells):
+    """Pressed from all sides, the stress is uniform. An edge is no plane of symmetry."""
+    left, parts = Support("left", {"x": 0.0}), []
+    for name, low, number in (("upper", 1.0, cells[0]), ("lower", 0.0, cells[1])):
+        mesh = trapezium(low, low + 1, rise, number, shapes)
+        loads = [Pressure(side, 1.0) for side in ("right", "top")[: 1 + (low > 0)]]
+        hold = (left,) if low else (left, Support("bottom", {"y": 0.0}))
+        end = "bottom" if low else "top"
+        parts.append(Part(name, mesh, MATERIAL, hold, tuple(loads), contact=end))
+    pair = Contact("upper", "lower", mu=0.0 if law == "frictionless" else 0.3, law=law)
+    scene = Scene("slanted", bodies=tuple(parts), contacts=(pair,), degree=degree)
+    result = run(scene, figures=(), tol=1e-11)
+    assert result.solution.solved
+    if law == "frictionless" or cells[0] != cells[1]:  # friction shares the force of the corner
+        assert np.abs(result.pressure - 1).max() < 1e-6
+    for fields in result.fields:
+        assert np.abs(fields.stress - [-1, -1, -0.6, 0]).max() < 1e-6
+
+
+@pytest.mark.parametrize("law", ["tied", "coulomb"])
+def test_a_node_on_a_support_sees_the_face_that_it_lies_on(law):
+    """Hexahedra of uneven sizes carry the contacts, on tetrahedra; the stress is uniform."""
+    x, y, z = [0, 0.7023, 1.3808, 2], [0, 0.5752, 1.3402, 2], [1, 1.356, 1.6583, 2]
+    upper = tensor_mesh(*map(np.array, (x, y, z)))
+    grid = np.linspace(0.0, 2.0, 4)
+    lower = tensor_mesh(grid, grid, grid / 2).to_meshtet()
+    ends = (
+        (f"{axis}{side}", i, v) for i, axis in enumerate("xyz") for side, v in (("-", 0), ("+", 2))
+    )
+    lower = lower.with_boundaries(
+        {name: lambda x, i=i, v=v: np.abs(x[i] - v / (1 + (i == 2))) < 1e-9 for name, i, v in ends}
+    )
+    sides = Support("x-", {"x": 0.0}), Support("y-", {"y": 0.0})
+    push = Pressure("x+", 1.0), Pressure("y+", 1.0)
+    bodies = (
+        Part("upper", upper, MATERIAL, sides, (*push, Pressure("z+", 1.0)), "z-"),
+        Part("lower", lower, MATERIAL, (*sides, Support("z-", {"z": 0.0})), push, "z+"),
+    )
+    pair = Contact("upper", "lower", mu=0.5, law=law)
+    result = run(
+        Scene("boxes", bodies=bodies, contacts=(pair,), kind="solid", degree=2), figures=()
+    )
+    assert np.abs(result.pressure - 1).max() < 1e-8
+    assert max(np.abs(own.stress - [-1, -1, -1, 0, 0, 0]).max() for own in result.fields) < 1e-7
 
 
 def test_matching_that_was_asked_for_fails_with_the_place_and_the_number():

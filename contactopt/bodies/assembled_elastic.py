@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import build_body
+from contactopt.bodies.corners import smooth_tilts
 from contactopt.bodies.elastic import ElasticBody, condense
 from contactopt.bodies.elements import mean_normals
 from contactopt.bodies.solvers import solver_type
@@ -86,6 +87,7 @@ class AssembledElastic(AssembledBody):
             places = curve(places)
         held = np.ones(len(body.load), dtype=bool)
         held[body.free] = False
+        tilts = smooth_tilts(trace.normals, trace.cells)
         return Surface(
             body.name,
             body.locations[:, trace.nodes],
@@ -93,7 +95,10 @@ class AssembledElastic(AssembledBody):
             trace.areas,
             trace.weights[:, nodes],
             places,
-            tuple(trace_of(trace.weights, trace.nodes, row, held) for row in unknowns),
+            tuple(
+                trace_of(trace.weights, trace.nodes, row, held, along)
+                for row, along in zip(unknowns, np.abs(trace.normals) <= tilts)
+            ),
             held[unknowns[:, trace.nodes]],
             trace.cells,
             self._mesh(name, held, curve),
@@ -137,15 +142,20 @@ class AssembledElastic(AssembledBody):
 
 
 def trace_of(
-    weights: sp.csr_matrix, nodes: np.ndarray, unknowns: np.ndarray, held: np.ndarray
+    weights: sp.csr_matrix,
+    nodes: np.ndarray,
+    unknowns: np.ndarray,
+    held: np.ndarray,
+    along: np.ndarray,
 ) -> sp.csr_matrix:
     """One component of the displacement of the contacts (k,) in terms of all unknowns (n,), by
-    their rows of the weights. Where it is prescribed at the contact node, it is that of the node
-    alone: the weights of a neighbour and of its mirror image cancel each other there.
+    their rows of the weights. Where it is prescribed at the contact node, and `along` the surface
+    (k,), it is that of the node alone: the weights of a neighbour and of its mirror image cancel
+    each other there. Pressure needs the whole of a component across the surface.
     """
     k = len(nodes)
     alone = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), weights.shape)
-    prescribed = sp.diags(held[unknowns[nodes]].astype(float))
+    prescribed = sp.diags((held[unknowns[nodes]] & along).astype(float))
     part = sp.coo_matrix(weights - prescribed @ (weights - alone))
     trace = sp.csr_matrix((part.data, (part.row, unknowns[part.col])), (k, len(held)))
     trace.eliminate_zeros()

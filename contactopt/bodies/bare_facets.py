@@ -33,7 +33,7 @@ KINDS = {
 }  # fmt: skip
 BESIDE = 0.25  # of an edge: how far a node in the middle may lie from it
 DEPTH = 0.5  # of the size of a facet: how deep the element behind it is
-INSIDE = 0.05  # of the size of a facet: how far nodes beneath it lie at least
+INSIDE = 1e-6  # of the size of a facet: nodes nearer to its plane lie in it
 FLAT = 1e-9  # of the longest edge squared: the area of a facet whose corners lie on a line
 
 

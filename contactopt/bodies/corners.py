@@ -18,6 +18,7 @@ of two facets at their common node decides, those of curved elements being exact
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +31,10 @@ from contactopt.meshes.given_curves import Curve
 
 ALIKE = 0.45  # a tangent line before an arc halves the turn: more than this is the turn of a curve
 PARALLEL = 0.7  # cosine of the angle between edges across which a surface turns in the same way
+STEEP, EXACT = 0.5, 1e-9  # tilts that are never smooth, and that are rounding
+# a polygon of equal facets is tilted by once the turn to the next normal, one whose second facet is
+# tiny by twice as much; with a margin
+UNEQUAL = 4.0
 STEP = 1e-3  # of a facet, at which the direction of a given curve is taken
 
 
@@ -177,3 +182,25 @@ def _common(nodes: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return np.stack([pairs[0, pair] * j + first, pairs[1, pair] * j + second]), nodes[
         pairs[0, pair], first
     ]
+
+
+def turns(normals: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(k,) the largest difference between the normal at a contact, of (dim, k), and those beside it
+    in the cells (v, c).
+    """
+    turn = np.zeros(normals.shape[1])
+    for corner, other in permutations(cells, 2):
+        apart = np.linalg.norm(normals[:, corner] - normals[:, other], axis=0)
+        np.maximum.at(turn, corner, apart)
+    return turn
+
+
+def smooth_tilts(normals: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    """(k,) how far off a plane the normals (dim, k) of facets may be where a surface crosses it
+    smoothly, so that the mirror images of both are one surface without an edge.
+    """
+    next_to = turns(normals, cells)
+    turn = next_to.copy()  # to the next facet: a straight one of second order has two cells
+    for corner, other in permutations(cells, 2):
+        np.maximum.at(turn, corner, next_to[other])
+    return np.minimum(STEEP, EXACT + UNEQUAL * turn)

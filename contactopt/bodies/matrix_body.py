@@ -19,6 +19,7 @@ from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Wo
 from contactopt.bodies.assembled_elastic import PLANE, trace_of
 from contactopt.bodies.bare_facets import bare_surface, ordered, turned_outwards
 from contactopt.bodies.body import Constraints
+from contactopt.bodies.corners import smooth_tilts
 from contactopt.bodies.elastic import ElasticBody, condense
 from contactopt.bodies.given_matrices import GivenMatrices
 from contactopt.bodies.matrix_checks import (
@@ -338,6 +339,7 @@ def _surface(
         None,
         np.zeros(len(facets), dtype=bool),
     )
+    along = np.abs(trace.normals) <= smooth_tilts(trace.normals, trace.cells)
     return Surface(
         part.name,
         at.x[:, point[trace.nodes]],
@@ -346,8 +348,8 @@ def _surface(
         trace.weights[:, nodes],
         at.x[:, point[nodes]],
         tuple(
-            sp.csr_matrix(trace_of(trace.weights, trace.nodes, row, at.fixed) @ at.D)
-            for row in unknowns
+            sp.csr_matrix(trace_of(trace.weights, trace.nodes, row, at.fixed, own) @ at.D)
+            for row, own in zip(unknowns, along)
         ),
         at.fixed[unknowns[:, trace.nodes]],
         trace.cells,

@@ -183,13 +183,14 @@ def check_definite(body: Matrices, made: ElasticBody, known: bool) -> None:
             )
         return
     K = body.A[kept][:, kept]
-    low, high = _extremes(lambda x: np.asarray(K @ x), start)
-    softest = _extremes(solve, start)
+    d = np.sqrt(K.diagonal())  # scaled by it, small elements and large ones count alike
+    low, high = _extremes(lambda x: np.asarray(K @ (x / d)) / d, start)
+    softest = _extremes(lambda x: d * solve(d * x), start)
     if min(low, 0.0) < -PIVOT * high or softest[0] < -SAME * softest[1]:
         raise InputError(
             f"body '{body.name}': K is not positive semidefinite, since {low:.3g} is among its"
-            f" eigenvalues, or {softest[0]:.3g} among those of its inverse; Lagrange multipliers,"
-            " mixed elements and buckling loads have no place in it."
+            f" scaled eigenvalues, or {softest[0]:.3g} among those of its inverse; Lagrange"
+            " multipliers, mixed elements and buckling loads have no place in it."
         )
     if not softest[1] * high * PIVOT < 1:
         raise without_stiffness(body)

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 import skfem
 
 from contactopt.bodies.elements import FACES, TIED
@@ -84,6 +85,13 @@ class Faces:
     def cell_nodes(self) -> np.ndarray:
         """(f c, v) nodes of the body that are the vertices of all linear cells."""
         return self.faces[:, self.cells].reshape(-1, self.cells.shape[1])
+
+    def around(self) -> sp.csr_array:
+        """(f, n) one where a node of the body is a corner of a face."""
+        corners = self.faces[:, : self.corners]
+        ends = np.arange(0, corners.size + 1, self.corners)
+        shape = len(corners), self.points.shape[1]
+        return sp.csr_array((np.ones(corners.size), corners.ravel(), ends), shape=shape)
 
     @cached_property
     def curved(self) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import permutations
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody, Surface
+from contactopt.bodies.corners import turns
 from contactopt.bodies.elements import opposed, unit
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
@@ -167,10 +167,7 @@ def _turn(surface: Surface) -> np.ndarray:
     """(k,) twice the largest difference between the normal at a contact and those next to it: a
     bound on the error of normals, which are means over facets.
     """
-    turn, normals = np.zeros(surface.points.shape[1]), surface.normals
-    for corner, other in permutations(surface.cells, 2):
-        apart = np.linalg.norm(normals[:, corner] - normals[:, other], axis=0)
-        np.maximum.at(turn, corner, apart)
+    turn = turns(surface.normals, surface.cells)
     return np.where(turn > 1e-12, 2 * turn, 0.0)
 
 

@@ -78,7 +78,7 @@ from skfem.quadrature import get_quadrature
 
 from contactopt.bodies.elements import FACES, weight_at
 from contactopt.checks import place_words
-from contactopt.coupling.faces import Faces, cross, evaluate
+from contactopt.coupling.faces import NEWTON, Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
 from contactopt.coupling.mortar_matrices import collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
@@ -267,10 +267,32 @@ def _alone(
     near = KDTree(places.T).query((x + inward).T)[1]
     n, axes = normals[:, nodes].T[:, None], points.axes[near]
     axes = axes - np.sum(axes * n, axis=2, keepdims=True) * n
-    there = other.locate(points.face[near], x, axes, points.there[:, near])
-    there = np.clip(there, 0.0, 1.0)
-    if other.corners == 3:
-        there /= np.maximum(there.sum(axis=0), 1.0)
-    N, row = other.shapes(there).T[:, None], np.arange(k)[:, None]
-    theirs = collect(N, row, other.faces[points.face[near]], (k, other.points.shape[1]))
+    face = points.face[near]
+    there, off = _on_face(other, face, x, axes, points.there[:, near])
+    # The face of the nearest point of integration need not be the one that the node sees.
+    around = other.around()
+    lost = np.flatnonzero(off > NEWTON)
+    beside = sp.coo_array(around[face[lost]] @ around.T)
+    row, tried = lost[beside.row], beside.col
+    middle = np.full(other.dim - 1, 1 / other.corners if other.corners == 3 else 0.5)
+    start = np.repeat(middle[:, None], len(row), axis=1)
+    places, missed = _on_face(other, tried, x[:, row], axes[row], start)
+    order = np.lexsort((-missed, row))  # of each contact the best face comes last, and stays
+    order = order[missed[order] < off[row[order]]]
+    face[row[order]], there[:, row[order]] = tried[order], places[:, order]
+    N = other.shapes(there).T[:, None]
+    theirs = collect(N, np.arange(k)[:, None], other.faces[face], (k, other.points.shape[1]))
     return mine, tidy(theirs)
+
+
+def _on_face(
+    surface: Faces, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where faces (m,) see points x (dim, m), moved onto them, and by how much: reference
+    coordinates (dim - 1, m), and (m,).
+    """
+    seen = surface.locate(face, x, axes, start)
+    there = np.clip(seen, 0.0, 1.0)
+    if surface.corners == 3:
+        there /= np.maximum(there.sum(axis=0), 1.0)
+    return there, np.abs(there - seen).max(axis=0)

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody, Mesh, Surface
+from contactopt.bodies.corners import smooth_tilts
 from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
@@ -55,6 +56,7 @@ def couple_surfaces(
     number[m.nodes] = np.arange(len(m.nodes))
     cells = number[carrier.cell_nodes()]
     cells = cells[np.all(cells >= 0, axis=1)].T  # those whose corners all carry contacts
+    along = own_held & (np.abs(m.normals) <= smooth_tilts(m.normals, cells))
     contacts = ContactPoints(m.points, m.normals, m.areas, cells, own_held & other_held, m.gap)
     laid_out = lay_out(contacts, scene.copies, scene.analysis.revolved)
     _, frames, order = laid_out
@@ -62,7 +64,7 @@ def couple_surfaces(
     for i, mesh in enumerate(meshes):
         traces = [
             sp.csr_matrix(sum(part @ picked for part, picked in zip(row, mesh.picked)))
-            for row in m.components(i, own_held)
+            for row in m.components(i, along)
         ]
         maps.append(local_map(traces, order, frames))
     side = SIDES[m.own]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.bodies.assembled import Guides
+from contactopt.bodies.corners import smooth_tilts
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 
@@ -53,7 +54,10 @@ class SymmetryPlane:
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """The planes, at most one per component, on which exactly this component is held."""
+    """The planes, at most one per component, on which exactly this component is held, and which the
+    surface crosses smoothly: a slanted one has an edge there, and each side its own normal.
+    """
+    tilts = smooth_tilts(contacts.normals, contacts.cells)
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, mask in enumerate(held):
         if not mask.any():
@@ -61,7 +65,7 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
         offset = float(points[c, mask].mean())
         plane = np.abs(points[c] - offset) <= NEAR * contacts.size
         side = np.sign(points[c, ~plane] - offset)
-        tangential = np.all(np.abs(normals[c, plane]) < 0.5)
+        tangential = np.all(np.abs(normals[c, plane]) <= tilts[plane])
         # along the normal, at least
         moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)
         if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):

@@ -47,7 +47,7 @@ def frontier(rows: list[Row], word: str) -> Any:
         low, high = predicted.min() / 2.5, predicted.max() * 2.5
         ax.fill_between(x, predicted, high, color=ORANGE, alpha=0.12, lw=0)
         ax.set_ylim(low, high)
-        places = (0.55, 0.86, word), (0.5, 0.1, "solves for both directions of slip")
+        places = (0.55, 0.86, word), (0.5, 0.1, "solves")
         ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ax.yaxis.set_major_formatter("{x:,g}")
         ax.yaxis.set_minor_locator(NullLocator())
