@@ -12,6 +12,7 @@ from matplotlib.text import Text
 import contactopt.methods.driver
 from contactopt import InputError, benchmark
 from contactopt.benchmark import report_figures as figures
+from contactopt.benchmark import reports as made_reports
 from contactopt.benchmark import tables
 from contactopt.benchmark.experiment import read_layout
 from contactopt.benchmark.report_figures import fitted_exponent
@@ -303,7 +304,7 @@ def test_a_figure_without_rows_is_left_out_with_a_sentence(reported, monkeypatch
     shutil.copy("campaigns/mine.py", "filtered")
     other = EXPERIMENT.replace('family = "rigid_bodies"}', 'family = "none"}')
     layout = read_layout(written(Path("filtered"), other, "small.toml"))
-    text = benchmark.reports.write_report(layout, Path("filtered"), benchmark.load("reports/small"))
+    text = made_reports.write_report(layout, Path("filtered"), benchmark.load("reports/small"))
     assert "Number 2 (speed_accuracy) is left out: no row with {'family': 'none'}." in text
     assert text.count("*Figure ") == 1 and text.count("*Table ") == 1
 
@@ -320,7 +321,7 @@ def test_findings_say_what_the_table_lacks(path):
         for value in table[column].unique()[:2]:
             rows = table[table[column] == value]
             own = [name for name in rows if "." in name and rows[name].isna().all()]
-            found = benchmark.reports._findings(layout, rows.drop(columns=own))
+            found = made_reports._findings(layout, rows.drop(columns=own))
             assert found and not re.search(r"\bnan\b", " ".join(found))
             lacking += sum(text.startswith("The table lacks the runs for") for text in found)
     assert lacking
