@@ -26,6 +26,7 @@ NEAREST = 40
 TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
+GENERIC = np.sqrt([1.0, 2.0, 3.0])  # a direction that no lattice of contacts repeats
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 
 
@@ -66,7 +67,11 @@ def places(problem: InterfaceProblem) -> list[np.ndarray]:
     points = problem.coordinates.T
     if not has_entries(problem.Q) or len(points) != problem.contacts or problem.contacts < 2:
         return []
-    cell = np.round(points / (TOGETHER * np.ptp(points, axis=0).max() or 1.0))
+    near = TOGETHER * np.ptp(points, axis=0).max()
+    line = np.sort(points @ GENERIC[: points.shape[1]])  # no two points of a grid fall together
+    if np.min(line[1:] - line[:-1]) > 2 * near:
+        return []
+    cell = np.round(points / (near or 1.0))
     own, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)[1:]
     own = own.ravel()
     order = np.argsort(own, kind="stable")
