@@ -35,8 +35,9 @@ def test_the_command_that_a_report_names_exists(path):
         return
     made_by = command(path)[-1]
     name = path.parent.name
-    assert made_by == f"questions.{name}"
-    assert (QUESTIONS / f"{name}.py").exists() or (QUESTIONS / name / "__main__.py").exists()
+    assert made_by in (f"questions.{name}", name)
+    program = ROOT.joinpath("experiments", *made_by.split("."))
+    assert program.with_suffix(".py").exists() or (program / "__main__.py").exists()
 
 
 def test_the_index_of_the_reports_names_each_of_them():
