@@ -28,7 +28,9 @@ PEER_GRACE = 30.0  # s for a peer, which ends itself, to start and to take over 
 # share of its limit of memory above which a process killed at its limit of time had leaked; Python
 # holds less than its limit when the next request fails
 LEAK = 0.8
-LONG = 1.0  # s of a run above which it is not repeated
+# s of CPU, and of the clock, of a run above which it is not repeated: on a busy machine short runs
+# take long by the clock
+LONG, LONG_WAIT = 1.0, 10.0
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
 
@@ -186,7 +188,7 @@ class Shares:
 class History:
     """What earlier runs say of later ones.
 
-    A run that took more than LONG, or was refused, is not repeated. Where one was ended at its
+    A run that took longer than LONG, or was refused, is not repeated. Where one was ended at its
     limit of time, so would be those of tighter tolerances, which are not made.
     """
 
@@ -199,7 +201,8 @@ class History:
     def add(self, row: Mapping[str, Any]) -> None:
         """Take a row into account."""
         key = row["problem"], row["method"]
-        if row["call_seconds"] > LONG or row["status"] == "refused":
+        long = row["cpu_seconds"] > LONG or row["call_seconds"] > LONG_WAIT
+        if long or row["status"] == "refused":
             self.once.add((*key, row["setting"]))
         if row["status"] in ("time_limit", "killed"):
             self.ended[key] = max(row["tolerance"], self.ended.get(key, 0.0))
