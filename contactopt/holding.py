@@ -1,4 +1,4 @@
-"""The factor on a load at which friction no longer holds the bodies, and they slide away.
+"""The factors on a load between which friction holds the bodies.
 
 With f times a load, u = Q r + V lambda + q + f g and V' r + s + f l = 0 (contactopt.problem): the
 load adds g to the displacements at r = 0 [length] and l to the resultants [force].
@@ -22,8 +22,9 @@ load adds g to the displacements at r = 0 [length] and l to the resultants [forc
    It grows for ever where all forces grow with d: the cones and the laws are homogeneous, so that
    nothing but what stays, however small beside it, could end that.
 
-The push gives Coulomb's limit, and the ends of statics are confirmed or corrected by it. The error
-is the difference between two meshes, of which the finer one has elements of half the size.
+The push gives Coulomb's limit, and the upper end of statics is confirmed or corrected by it. The
+lower end, which a load has that presses the bodies together, stays a bound. The error is the
+difference between two meshes, of which the finer one has elements of half the size.
 
 Source: Drucker (1954), Coulomb friction, plasticity, and limit loads, J. Appl. Mech. 21, 71-74.
 """
@@ -58,10 +59,12 @@ EARLY = 6  # pushes that need not be solved while the motion is small
 PUSHES = 20  # so that the last one is 1e12 times the first
 STEADY = 1e-5  # relative growth of the force below which it no longer grows
 ALIKE = 1e-3  # relative difference by which forces are a multiple of others, or two limits the same
+AWAY = "slide away, tip over or lift off"
 NOTHING = 1e-9  # of the forces of the contacts: a load that is rounding
 WAYS = {
     "statics": "the largest one that forces in the friction cones balance, confirmed by a push",
-    "bound": "a bound: no larger one is balanced by forces in the friction cones",
+    "bound": "a bound: forces in the friction cones balance no larger one",
+    "below": "a bound: forces in the friction cones balance no smaller one",
     "push": "found by pushing the place of the load until its force no longer grew",
     "supports": "supports bear this load, whatever friction does",
 }
@@ -70,12 +73,13 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Limit:
-    """At which factor on a load the bodies slide away.
+    """At which factors on a load the bodies slide away, tip over or lift off.
 
-    factor    0: at any such load; infinite: at none; not a number: no push could be solved
+    factor    above which they do; infinite: above none; not a number: no push could be solved
     interval  of the factors at which forces in the friction cones balance the loads, with `factor`
-              for its upper end; None: the bodies rest at no factor
-    error     of the factor, estimated from two meshes
+              for its upper end: below its lower end, too, they do, though the factor be infinite.
+              None: the bodies rest at no factor
+    error     of the factor, estimated from two meshes, as an absolute number
     way       'statics', 'bound', 'push' or 'supports', which the sentence explains
     sentence  the answer in words
     factors   on the coarser and on the finer mesh
@@ -132,7 +136,7 @@ def limit_of(
         found.append(_on_mesh(before, last, note))
     (coarse, _, _), (factor, interval, way) = found
     error = 0.0 if coarse == factor else abs(factor - coarse)
-    words = _words(states[-1], load or "the last step", _force(held[-1], states[-1]), found, error)
+    words = _words(states[-1], load or "the last step", _force(held[-1], states[-1]), found)
     return Limit(factor, interval, error, way, words, (coarse, factor))
 
 
@@ -330,30 +334,47 @@ class _Push:
         return np.inf
 
 
-def _words(scene: Scene, load: str, force: float | None, found: list[Found], error: float) -> str:
-    """The answer in a sentence or two."""
+def _words(scene: Scene, load: str, force: float | None, found: list[Found]) -> str:
+    """The answer in a few sentences: both ends, whether 1 lies between them, whence they come."""
     factor, interval, way = found[-1]
     if interval is None:
-        return f"{scene.name}: the bodies slide away, whatever the factor on {load} is."
+        return f"{scene.name}: the bodies {AWAY}, whatever the factor on {load} is."
+    low, high = interval
+    if low == high == 0:
+        return f"{scene.name}: any {load} makes the bodies {AWAY}: the factor is 0."
+    why = WAYS["supports"] if way == "supports" else "its friction grows with the load"
+    if np.isinf([low, high]).all():
+        which = "factor" if way == "supports" else "positive factor"
+        return f"{scene.name}: no {which} on {load} makes the bodies {AWAY}: {why}."
+    given = "friction can hold them" if low <= 1 <= high else "they do"
+    if np.abs(np.array(interval) - 1).min() <= STEADY:
+        given = "they are at the limit"
+    below = f"below {low:.5g} times "
     if np.isnan(factor):
-        return (
-            f"{scene.name}: the limit of {load} is unknown, because a push was not solved; -v says"
-            " which."
-        )
-    if factor == np.inf:
-        why = WAYS["supports"] if way == "supports" else "its friction grows with the load"
-        return f"{scene.name}: no factor on {load} makes the bodies slide away: {why}."
-    if factor == 0:
-        return f"{scene.name}: any {load} makes the bodies slide away: the factor is 0."
-    if factor < 0:
-        return (
-            f"{scene.name}: the bodies slide away unless {load} acts the other way, at factors from"
-            f" {interval[0]:.5g} to {factor:.5g}. The last is {WAYS[way]}; two meshes differ by"
-            f" {error:.1e}."
-        )
+        unknown = f"{scene.name}: the limit of {load} is unknown, because a push was not solved; -v"
+        at_one = f"; at 1, the load as given, {given}" if low > 1 else ""
+        also = f" The bodies {AWAY} {below}it{at_one}." if low > 0 else ""
+        return f"{unknown} says which.{also}"
     total = "" if force is None else f" ({factor * force:.5g} {force_unit(scene.units)})"
-    below = f"; they also slide away below {interval[0]:.5g}" if interval[0] > 0 else ""
+    sources = [f"the lower end is {WAYS['below']}"] if np.isfinite(low) else []
+    if factor == np.inf:
+        ends = f"{below}{load}, and at no larger factor: {why}"
+    else:
+        sources = [f"the upper end is {WAYS[way]}", *sources]
+        other = f", and {below}it" if np.isfinite(low) else ""
+        ends = f"above {factor:.5g} times {load}{total}{other}"
+    source = "; ".join(sources).capitalize()
     return (
-        f"{scene.name}: the bodies slide away at {factor:.5g} times {load}{total}{below}. This is"
-        f" {WAYS[way]}; two meshes differ by {error:.1e}."
+        f"{scene.name}: the bodies {AWAY} {ends}. At 1, the load as given, {given}. {source};"
+        f" {_apart(found)}."
     )
+
+
+def _apart(found: list[Found]) -> str:
+    """By how much the ends on two meshes differ, in words."""
+    (_, coarse, _), (_, fine, _) = found
+    ends = [(a, b) for a, b in zip(coarse or (np.nan, np.nan), fine or ()) if np.isfinite(b)]
+    most = np.max([abs(a - b) / abs(b) if b else np.inf for a, b in ends if a != b], initial=0.0)
+    if not np.isfinite(most):
+        return "a coarser mesh gives another answer, so that this one is uncertain"
+    return f"two meshes differ by {100 * most:.1g} %"

@@ -60,6 +60,14 @@ def pressed():
     return replace(slope(), upper=part)
 
 
+def beneath(push):
+    """The block, without weight, pushed along by `push` under a load of 2 that presses it down:
+    friction holds it from push / 0.6 times that load on.
+    """
+    loads = Traction("top", (0.0, -1.0)), Traction("left", (push, 0.0))
+    return replace(slope(), upper=replace(slope().upper, loads=loads))
+
+
 def wedge(mu=0.2, angle=10.0):
     """A wedge that is driven under a block of weight W = 2 beside a wall: W tan(angle + 2 phi)."""
     high = 0.5 + 2 * math.tan(math.radians(angle))
@@ -220,14 +228,24 @@ def test_the_last_step_of_a_path_is_the_load():
     [
         (slope(0.0, 0.0), "block:left", 0.0, "any block:left"),
         (slope(support=(Support("right", {"x": 0.0}),)), "block:left", np.inf, "supports bear"),
-        (pressed(), "block:top", np.inf, "friction grows with the load"),
+        (pressed(), "block:top", np.inf, "below 0 times block:top, and at no larger"),
+        (beneath(0.5), "block:top", np.inf, "below 0.83333 times block:top, and at no larger"),
+        (beneath(0.5), "block:top", np.inf, "At 1, the load as given, friction can"),
+        (beneath(0.65), "block:top", np.inf, "below 1.0833 times block:top, and at no larger"),
+        (beneath(0.65), "block:top", np.inf, "At 1, the load as given, they do"),
+        (slope(0.0, 3.0), "block:left", 4.0, "slide away, tip over or lift off above 4 times"),
         pytest.param(
             *(slope(), "block:body_force", np.inf, "friction grows with the load"),
             marks=pytest.mark.slow,
         ),
         (slope(30.0, 0.1), "block:body_force", 0.0, "whatever the factor on block"),
-        (slope(10.0, 0.1), "block:left:x", -0.15033, "acts the other way"),
-        (slope(-30.0, 0.1), "block:left:x", 1.1732, "slide away below 0.82679"),
+        (slope(10.0, 0.1), "block:left:x", -0.15033, "At 1, the load as given, they do."),
+        (
+            slope(-30.0, 0.1),
+            "block:left:x",
+            1.1732,
+            "below 0.82679 times it. At 1, the load as given, friction can",
+        ),
     ],
 )
 def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, factor, said):

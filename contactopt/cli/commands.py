@@ -143,7 +143,7 @@ def simplify(options: argparse.Namespace) -> int:
 
 
 def limit(options: argparse.Namespace) -> int:
-    """Say at which factor on a load the bodies slide away; the exit code is 1 if it is unknown."""
+    """Say between which factors on a load friction holds; the exit code is 1 if it is unknown."""
     from contactopt.holding import limit
 
     changes = _arguments_of(options.set)
