@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import MATERIAL, block
 
-from contactopt import Part, Plate, Scene, Support, Traction, gradient, run
+from contactopt import Contact, Part, Plate, Scene, Support, Traction, gradient, run
 from contactopt.meshes.polar import ring
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.quantities import value_of
@@ -205,3 +205,46 @@ def test_the_motion_of_a_held_washer_has_derivatives(quantity):
     step = 1e-5
     slope = gradient(value(1.0)[1], quantity, "E:upper").by["E:upper"] * MATERIAL.E
     assert slope == pytest.approx((value(1 + step)[0] - value(1 - step)[0]) / (2 * step), rel=1e-5)
+
+
+@pytest.mark.parametrize("held", ["upper", "lower"])
+def test_neither_reading_changes_with_a_translation_of_the_scene(held):
+    """A bar pulled between two washers, of which both are pressed, or one is held, still or moved:
+    equilibrium makes all the same but for a translation, which adds to every displacement.
+    """
+
+    def scene(support, moved=0.0):
+        def part(name, low, high, supports=(), **force):
+            mesh = block("plane-strain", low, high, cells=4, width=2.0)
+            end = "side0" if name == "bar" else "top" if low >= 1 else "bottom"
+            return Part(name, mesh, MATERIAL, supports, (Plate(end, force, glued=False),))
+
+        bodies = [
+            part("lower", -1, 0, (Support("side0", {"x": moved}),), y=2.0),
+            part("bar", 0, 1, x=0.2),
+            part("upper", 1, 2, (Support("side0", {"x": moved}),), y=-2.0),
+        ]
+        if support:
+            end = {"upper": ("top", 2), "lower": ("bottom", 0)}[held]
+            own = bodies[end[1]]
+            supports = (*own.supports, Support(end[0], {"y": moved}))
+            bodies[end[1]] = replace(own, supports=supports, loads=())
+        contacts = (
+            Contact("upper:bottom", "bar:top", 0.3),
+            Contact("bar:bottom", "lower:top", 0.3),
+        )
+        return Scene("washers", bodies=tuple(bodies), contacts=contacts)
+
+    (free, *others) = (follow([scene(*own)]) for own in ((False,), (True,), (True, 0.25)))
+    assert free.solved
+    for path in others:
+        assert path.solved
+        for name in ("approach", "shift"):
+            assert path.history[name] == pytest.approx(free.history[name], rel=1e-6), name
+    ends = {own.name: own for own in free.fields(0)}
+    at = [
+        ends[name].displacement[1, np.unique(mesh.facets[:, mesh.boundaries[side]])].mean()
+        for name, side in (("upper", "top"), ("lower", "bottom"))
+        for mesh in (ends[name].mesh,)
+    ]
+    assert free.history["approach"][0] == pytest.approx(at[1] - at[0], rel=1e-9)

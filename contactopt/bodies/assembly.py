@@ -82,17 +82,18 @@ class Matrices:
 
     def carried(self, component: int) -> np.ndarray:
         """Weights (n,) of the displacements that give the motion along a component: that of the
-        plates that move along it; else of the supports that move along it; else, where nothing
-        holds the body along it, the mean displacement.
+        plates that move along it; else of the supports that move along it, or hold it if none
+        does; else the mean displacement.
         """
         own, n = self.unknowns[component], len(self.load)
         moving = [column for column in self.motion.T if column[own].any()]
         if not moving:
-            driven = np.zeros(n)
-            driven[own] = self.prescribed[own] != 0
+            along, driven = np.zeros(n), self.prescribed != 0
+            along[own] = 1.0
             supports = [own for name, own in self.holders.items() if name.startswith("support")]
-            parts = [np.bincount(own, driven[own], n) for own in supports]
-            moving = [part for part in parts if part.any()]
+            for counts in (along * driven, along):
+                parts = [np.bincount(own, counts[own], n) for own in supports]
+                moving = moving or [part for part in parts if part.any()]
         if moving:
             return np.asarray(sum(column / column.sum() for column in moving) / len(moving))
         fields, forces = self.rigid_motions.fields, self.rigid_motions.forces

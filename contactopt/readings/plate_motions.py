@@ -3,7 +3,8 @@ displacements of the nodes under the plates.
 
 The motion of a body is that of its plates, component by component, or of the supports that move it
 where no plate does. A rigid body and a half-space move as a whole. What nothing moves and nothing
-holds moves by its mean displacement.
+holds moves by its mean displacement. A translation of the whole scene changes neither reading: it
+is the same whether the lower body is held or pressed by a plate.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from contactopt.bodies.protocol import Body
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
 
@@ -42,8 +44,8 @@ def approach(reduction: Reduction, solution: Solution) -> float | None:
 
 def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Motion | None:
     """The motion along the mean normal (component 0) or the mean t1 (1), from displacements U (n,):
-    of bodies with plates, else of all, upper less lower mean. Around a body there is none along the
-    normal (None), and that along t1 is zero in the mean.
+    upper less lower mean. Around a body there is none along the normal (None), and that along t1 is
+    zero in the mean.
     """
     weights = _weights(reduction, component)
     if weights is None:
@@ -59,28 +61,46 @@ def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Mo
 
 
 def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
+    """Of each side the bodies count that plates or supports hold or move, component by component,
+    else all. Both sides have one direction, so that no translation of the whole scene counts.
+    """
     scene, problem = reduction.scene, reduction.problem
     names = [part.name for part in scene.parts]
-    plates = np.array([_has_plate(part) for part in scene.parts])
-    counts = plates if plates.any() else np.ones(len(names), dtype=bool)
-    made, frames = np.zeros((len(names), problem.dim)), reduction.frames[:, component]
-    for side, sign in enumerate((1.0, -1.0)):
-        owner = np.concatenate(
+    counts = np.array([_driven(body, problem.dim) for body in reduction.bodies])
+    made, frames = np.zeros(counts.shape), reduction.frames[:, component]
+    owners = [
+        np.concatenate(
             [
                 np.full(own.stop - own.start, names.index(pair.bodies[side]))
                 for pair, own in zip(scene.pairs, problem.pairs)
             ]
         )
-        areas = problem.areas * counts[owner]
-        if not np.any(areas > 0):
-            continue
-        mean = _along_symmetry(reduction, areas @ frames / areas.sum(), component)
-        length = float(np.linalg.norm(mean))
-        if length < CLOSED:
-            return None if component == 0 else 0 * made
-        shares = np.bincount(owner, areas, len(names)) / areas.sum()
-        made += sign * shares[:, None] * mean / length
+        for side in range(2)
+    ]
+    areas = _of_those(counts.any(axis=1)[owners[0]], problem.areas)
+    mean = _along_symmetry(reduction, areas @ frames / areas.sum(), component)
+    length = float(np.linalg.norm(mean))
+    if length < CLOSED:
+        return None if component == 0 else made
+    for owner, sign in zip(owners, (1.0, -1.0)):
+        for c in np.flatnonzero(mean):
+            areas = _of_those(counts[owner, c], problem.areas)
+            shares = np.bincount(owner, areas, len(names)) / areas.sum()
+            made[:, c] += sign * shares * mean[c] / length
     return made
+
+
+def _of_those(counts: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    """The areas (k,) of the contacts that count, or all if none does."""
+    return areas * counts if np.any(areas * counts > 0) else areas
+
+
+def _driven(body: Body, dim: int) -> np.ndarray:
+    """Whether plates or supports hold or move a body along each component (dim,)."""
+    view = body.view
+    if view is None:  # as a whole
+        return np.ones(dim, dtype=bool)
+    return ~np.isin(view.unknowns, view.free).all(axis=1)
 
 
 def _along_symmetry(reduction: Reduction, mean: np.ndarray, component: int) -> np.ndarray:
