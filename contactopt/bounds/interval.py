@@ -41,6 +41,7 @@ friction. Coulomb's law needs small friction, as in contactopt.bounds.bound.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -85,6 +86,8 @@ def interval(bound: Bound, quantity: Quantity) -> tuple[float, float]:
         raise InputError(reason)
     state = State(scene.reduction, scene.solution)
     seeds = quantity.slopes(state)
+    if quantity.name in ("approach", "shift") and seeds.reactions is None:  # of held bodies
+        seeds = replace(seeds, bodies=())
     if seeds.bodies and quantity.name.partition(":")[0] != ENERGY:
         raise InputError(f"there is no bound of the {quantity.name} of a plate on a held body.")
     duals = duals_of(state, seeds)

@@ -253,7 +253,7 @@ def _motion(state: State, component: int) -> Seeds:
         by_U.append(total)
     bodies = tuple(by_U) if any(each is not None for each in by_U) else ()
     value = sign * found.value + 0.0
-    return Seeds(value, by_r if bodies else None, np.concatenate(by_motions), bodies=bodies)
+    return Seeds(value, by_r if by_r.any() else None, np.concatenate(by_motions), bodies=bodies)
 
 
 def _pressure_at(state: State, number: int) -> Seeds:
