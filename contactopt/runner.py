@@ -296,7 +296,8 @@ def _result(
         summary = _summary(solved, names)
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
-            summary["remarks"] += corner_remarks(reduction, solution)
+        known = estimate.message if estimate else ""
+        summary["remarks"] += [s for s in corner_remarks(reduction, solution) if s not in known]
     noted = [solution] if solved.path is None else solved.path.solutions
     every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
     if solution.solved:  # the states of a path before are kept

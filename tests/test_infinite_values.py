@@ -55,6 +55,14 @@ def test_pressure_under_a_corner(upper, lower, infinite):
     assert reading["error"] is None if infinite else reading["error"] is not None
 
 
+@pytest.mark.parametrize("quantity", ["energy", "pressure"])  # whose estimate says so itself
+def test_refined_meshes_say_so_once(quantity):
+    scene = pressed(box((0, 0), (2, 1), 4), box((-1, -1), (3, 0), 4))
+    result = run(scene, accuracy=0.3, quantity=quantity, adaptive=True, figures=())
+    said = "; ".join([*result.summary["remarks"], result.estimate.message])
+    assert said.count("under a corner") == 1
+
+
 @pytest.mark.parametrize("shoulder", [True, False])
 def test_stress_at_a_re_entrant_corner(shoulder):
     mesh = box((0, 0), (2, 2))

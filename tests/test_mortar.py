@@ -1,6 +1,7 @@
 """Mortar coupling: exactness on pure surfaces, equilibrium, curved interfaces, and whole scenes."""
 
 import logging
+import re
 from dataclasses import replace
 from unittest.mock import patch
 
@@ -458,9 +459,9 @@ def test_pressure_where_the_other_surface_ends_within_a_face(degree, covered):
     assert coupled.problem.areas.sum() == pytest.approx(1 + 2 * covered * h, rel=1e-12)
     assert pressure.max() < 5.5  # 1.7 to 2.0 where a node lies below the edge
     assert np.ptp(coupled.mortar.points[0]) < 1 + 2 * covered * h + 1e-12
-    (told,) = remarks(coupled.reduction, solution)
-    assert told.startswith("2 contacts of") or told.startswith("4 contacts of")
-    assert "touch at the rim of the other surface" in told
+    assert not remarks(coupled.reduction, solution)  # the answer does not suffer
+    told = re.search("ends within the faces of ([24]) contacts", coupled.reduction.coupling.why)
+    assert told is not None
 
 
 @pytest.mark.parametrize("dim", [2, 3])

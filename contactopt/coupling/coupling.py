@@ -37,6 +37,7 @@ from contactopt.problem.laws import Law, Place, make_law
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
+COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 log = logging.getLogger(__name__)
 
 # name -> (module, function (scene, pair, upper, lower) -> Coupling, what it is)
@@ -125,6 +126,11 @@ def couple(
             why = f"the nodes match, but {made.remarks[0].partition(': ')[2]}"
     if made.kind != ways[0]:
         log.info("contact '%s' is coupled by %s: %s", pair.name, made.kind, why)
+    if made.share is not None and (ends := np.count_nonzero(made.share < COVERED)):
+        why += (
+            f"; the other surface ends within the faces of {ends} contacts, whose pressure is the"
+            " force over the part that it covers"
+        )
     return replace(made, why=why)
 
 

@@ -17,13 +17,11 @@ from contactopt.readings.resultants import views
 # (reports/accuracy)
 FEWEST = 4
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
-COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
     """Sentences on couplings that do not pass a constant pressure on; for certified solutions also
-    on zones that end by themselves and are smaller than FEWEST elements, and on contacts at the
-    other surface's rim.
+    on zones that end by themselves and are smaller than FEWEST elements.
     """
     coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:
@@ -33,25 +31,7 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
         " distributed: refine the meshes there, or ask for an accuracy."
         for (name, count), own in coarse(reduction, solution)
     ]
-    return (*coupled, *few, *_at_rims(reduction, solution))
-
-
-def _at_rims(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on contacts where the other surface ends and covers a part of their faces."""
-    found = []
-    for (view, own), coupling in zip(views(reduction, solution), reduction.couplings):
-        touches = contact_status(view.problem, own.reactions).touching
-        if coupling.share is None or not np.any(rim := touches & (coupling.share < COVERED)):
-            continue
-        least = np.argmin(np.where(rim, coupling.share, 1.0))
-        where = place_words(coupling.positions[:, least])
-        found.append(
-            f"{rim.sum()} contacts of '{view.problem.pairs[0].name}' touch at the rim of the other"
-            " surface, which covers only a part of their faces, as little as"
-            f" {coupling.share[least]:.0%} near ({where}): their pressure is the force over that"
-            " part."
-        )
-    return found
+    return (*coupled, *few)
 
 
 def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
