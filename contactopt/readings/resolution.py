@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
