@@ -77,7 +77,8 @@ def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
         )
         for side in range(2)
     ]
-    areas = _of_those(counts.any(axis=1)[owners[0]], problem.areas)
+    counted = np.any(counts[owners[0]], axis=1)
+    areas = _of_those(np.asarray(counted), problem.areas)
     mean = _along_symmetry(reduction, areas @ frames / areas.sum(), component)
     length = float(np.linalg.norm(mean))
     if length < CLOSED:
@@ -100,7 +101,7 @@ def _driven(body: Body, dim: int) -> np.ndarray:
     view = body.view
     if view is None:  # as a whole
         return np.ones(dim, dtype=bool)
-    return ~np.isin(view.unknowns, view.free).all(axis=1)
+    return np.any(np.isin(view.unknowns, view.free, invert=True), axis=1)
 
 
 def _along_symmetry(reduction: Reduction, mean: np.ndarray, component: int) -> np.ndarray:
