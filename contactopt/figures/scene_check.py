@@ -95,12 +95,10 @@ def check_scene(
     predicted = hertz(scene, made, free)
     for pair, own in zip(scene.pairs, made.couplings):
         lines += _pair_lines(scene, pair, own)
-        if pair.name in predicted and scene.given:
-            sides = zip(pair.bodies, pair.surfaces)
-            face = next(
-                f"{b}:{s or scene.meshed[b].contact}" for b, s in sides if b in scene.meshed
-            )
-            lines += predicted[pair.name].words(length, face, float(own.areas.sum()))
+        sides = zip(pair.bodies, pair.surfaces)
+        faces = [f"{b}:{s or scene.meshed[b].contact}" for b, s in sides if b in scene.meshed]
+        if pair.name in predicted and scene.given and faces:
+            lines += predicted[pair.name].words(length, faces[0], float(own.areas.sum()))
     if scene.copies > 1:
         where = " and ".join(_direction(plane.inward) for plane in made.planes)
         where = where and f", across planes with normals {where}"
