@@ -153,6 +153,18 @@ def test_a_slanted_plane_keeps_its_normal_at_a_wall(cells, kind, degree, law):
 
 
 @pytest.mark.parametrize(
+    ("cells", "kind", "degree"),
+    [((2, 2), "quad", 1), ((2, 2), "quad", 2), ((2, 2), "tri", 2), ((2, 3), "tri", 2)],
+)
+def test_a_slanted_plane_rubs_at_a_wall_that_moves(cells, kind, degree):
+    scene = slanted(1.3, cells, kind, degree, "coulomb")
+    lower, upper = scene.bodies
+    moved = replace(upper, supports=(Support("left", {"x": 0.002}),))
+    forces = solve(reduce(replace(scene, bodies=(lower, moved))), tol=1e-10).reactions
+    assert np.allclose(forces[:, 1], -0.3 * forces[:, 0]) and forces[:, 0].min() > 0
+
+
+@pytest.mark.parametrize(
     ("cells", "kinds", "degree"),
     [((2, 2), ("quad", "quad"), 1), ((2, 3), ("quad", "tri"), 1), ((1, 2), ("quad", "quad"), 2)],
 )

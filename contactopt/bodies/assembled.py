@@ -69,6 +69,8 @@ class Surface:
               to the displacement of its contacts in that component
     held      (dim, k) whether that component of the contact's displacement is prescribed
     cells     (v, c) contacts at the corners of the c linear cells that cover the surface
+    alone     as the traces, of the nodes at the contacts by themselves; None where the traces are
+              these
     mesh      the finite elements behind it; None for a body that has none
     chart     places of the contacts on the surface, where the body knows them and its normals are
               all the same
@@ -83,6 +85,7 @@ class Surface:
     traces: tuple[sp.csr_matrix, ...]
     held: np.ndarray
     cells: np.ndarray
+    alone: tuple[sp.csr_matrix, ...] | None = None
     mesh: Mesh | None = None
     chart: Chart | None = None
 

@@ -13,7 +13,7 @@ from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.body import build_body
 from contactopt.bodies.corners import smooth_tilts
 from contactopt.bodies.elastic import ElasticBody, condense
-from contactopt.bodies.elements import mean_normals
+from contactopt.bodies.elements import Trace, mean_normals
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.bodies.thickness import thin_facets
@@ -101,6 +101,7 @@ class AssembledElastic(AssembledBody):
             ),
             held[unknowns[:, trace.nodes]],
             trace.cells,
+            alone_of(trace, unknowns, held),
             self._mesh(name, held, curve),
         )
 
@@ -139,6 +140,20 @@ class AssembledElastic(AssembledBody):
 
     def prepare(self, solver: str, entries: bool) -> ElasticBody:
         return condense(self.body, solver, entries)
+
+
+def alone_of(
+    trace: Trace, unknowns: np.ndarray, held: np.ndarray
+) -> tuple[sp.csr_matrix, ...] | None:
+    """The displacement of the nodes at the contacts by themselves, component by component; None
+    where it is that of the contacts.
+    """
+    k, W = len(trace.nodes), trace.weights
+    own = sp.csr_matrix((np.ones(k), (np.arange(k), trace.nodes)), W.shape)
+    if not abs(W - own).max():
+        return None
+    every = np.ones(k, dtype=bool)
+    return tuple(trace_of(own, trace.nodes, row, held, every) for row in unknowns)
 
 
 def trace_of(

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
-from contactopt.bodies.assembled_elastic import PLANE, trace_of
+from contactopt.bodies.assembled_elastic import PLANE, alone_of, trace_of
 from contactopt.bodies.bare_facets import bare_surface, ordered, turned_outwards
 from contactopt.bodies.body import Constraints
 from contactopt.bodies.corners import smooth_tilts
@@ -340,6 +340,7 @@ def _surface(
         np.zeros(len(facets), dtype=bool),
     )
     along = np.abs(trace.normals) <= smooth_tilts(trace.normals, trace.cells)
+    alone = alone_of(trace, unknowns, at.fixed)
     return Surface(
         part.name,
         at.x[:, point[trace.nodes]],
@@ -353,5 +354,6 @@ def _surface(
         ),
         at.fixed[unknowns[:, trace.nodes]],
         trace.cells,
+        alone and tuple(sp.csr_matrix(each @ at.D) for each in alone),
         mesh,
     )

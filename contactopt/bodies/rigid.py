@@ -79,7 +79,14 @@ class RigidBody(UndividedBody):
         )
         held = np.tile(fixed[:, None], k)
         surface = replace(
-            other, body=self.name, normals=normals, traces=traces, held=held, mesh=None, chart=None
+            other,
+            body=self.name,
+            normals=normals,
+            traces=traces,
+            held=held,
+            alone=None,
+            mesh=None,
+            chart=None,
         )
         gap = self._gap(other)
         self._check_side(other, np.sum(normals * suggested, axis=0), gap)

@@ -38,7 +38,7 @@ def filling(maps: Maps) -> int:
 def _entries(bodies: Sequence[Body], maps: Maps) -> np.ndarray | sp.csr_array:
     """Q by its entries, symmetric to the last digit: sparse where most pairs share no body."""
     n = maps[0].shape[0]
-    moving = _moving(bodies, maps)
+    moving = _moving(bodies, maps, [body.through(B) for body, B in zip(bodies, maps)])
     made = each(lambda term: term[0].through(term[1]).entries(), moving, _parallel(moving))
     parts = [(rows, own) for (*_, rows), own in zip(moving, made)]
     if filling(maps) < SPARSE * n**2:
@@ -69,7 +69,7 @@ def operator(
                 " periodic or none."
             )
         return Convolution(sum(known[1:], known[0]))
-    moving = _moving(bodies, maps)
+    moving = _moving(bodies, maps, seen)
     parallel = _parallel(moving)
     acts = each(lambda term: term[0].through(term[1]).product, moving, parallel)
     terms = [(act, rows) for act, (*_, rows) in zip(acts, moving)]
@@ -125,9 +125,11 @@ def _before_condensation(seen: Sequence[Seen]) -> CoupledForm:
     return CoupledForm(tuple(terms), rest)
 
 
-def _moving(bodies: Sequence[Body], maps: Maps) -> list[tuple[Body, sp.csr_matrix, np.ndarray]]:
+def _moving(
+    bodies: Sequence[Body], maps: Maps, seen: Sequence[Seen]
+) -> list[tuple[Body, sp.csr_matrix, np.ndarray]]:
     """The bodies that contact forces move, their maps' needed rows, and these rows of Q."""
-    needed = [(body, B, _rows(B)) for body, B in zip(bodies, maps) if body.through(B).moved.any()]
+    needed = [(body, B, _rows(B)) for body, B, own in zip(bodies, maps, seen) if own.moved.any()]
     return [(body, B[rows], rows) for body, B, rows in needed]
 
 

@@ -228,19 +228,40 @@ def local_map(
     return sp.csr_matrix(T)
 
 
-def guided(T: sp.csr_matrix, frames: np.ndarray, held: np.ndarray) -> sp.csr_matrix:
-    """A map T (k dim, n) to contacts (k,) without the tangential motion that supports rule out.
+def guided(
+    T: sp.csr_matrix,
+    alone: Sequence[sp.csr_matrix],
+    contacts: np.ndarray,
+    frames: np.ndarray,
+    held: np.ndarray,
+) -> sp.csr_matrix:
+    """A map T (k dim, n) to contacts (k,) of a surface whose slip along supports is that of their
+    nodes, from the displacement `alone` (m, n) of the nodes at the contacts, in space.
 
-    Where both bodies are held along an axis e, held (dim, k), that leans on the contact's normal n,
-    no friction acts along the tangential part of e: there u_t is a multiple of u_n, and friction
-    along it would be what the support gives. So the pressure alone carries the normal force.
+    Where supports or plates hold both bodies along an axis e, held (dim, k), that leans on the
+    contact's normal n, the nodes slip by u_e, so that u_t e_t = u_e - n_e u_n. In contact u_n = 0,
+    and friction along e_t acts on what holds the bodies. Otherwise it would be a part of the normal
+    force under another name, and neither would be unique.
     """
     leaning = held.T & (np.abs(frames[:, 0]) > NEAR)
-    if not leaning.any():
+    some = np.flatnonzero(leaning.any(axis=1))
+    if not len(some):
         return T
-    keep = np.broadcast_to(np.eye(frames.shape[1]), frames.shape).copy()
-    for i in np.flatnonzero(leaning.any(axis=1)):
+    k, dim = frames.shape[:2]
+    keep = np.broadcast_to(np.eye(dim), frames.shape).copy()
+    slips = np.zeros((len(some), dim, dim))
+    for j, i in enumerate(some):
         across = frames[i, 1:][:, leaning[i]]
-        keep[i, 1:, 1:] -= across @ np.linalg.pinv(across, rcond=NEAR)
-    k = np.arange(len(keep) + 1)
-    return sp.csr_matrix(sp.bsr_matrix((keep, k[:-1], k)) @ T)
+        inverse = np.linalg.pinv(across, rcond=NEAR)
+        keep[i, 1:, 1:] -= across @ inverse
+        slips[j, 1:, leaning[i]] = inverse
+    blocks = sp.bsr_matrix((keep, np.arange(k), np.arange(k + 1)))
+    rows = dim * some[:, None] + np.arange(dim)
+    added = sp.csr_matrix(T.shape)
+    for c, trace in enumerate(alone):
+        at = np.repeat(np.arange(len(some)), dim)
+        along = sp.csr_matrix((slips[:, :, c].ravel(), (rows.ravel(), at)), (k * dim, len(some)))
+        added = added + along @ trace[contacts[some]]
+    T = sp.csr_matrix(blocks @ T + added)
+    T.eliminate_zeros()
+    return T

@@ -63,9 +63,13 @@ def couple_nodes(
         apart = (first.weights @ first.places.T)[partner] - second.weights @ second.places.T
         points = replace(points, normals=normals, gap=np.sum(normals * apart.T, axis=0))
     _, frames, order = laid_out = _laid_out(scene, lead, points)
-    theirs = local_map(first.traces, partner[order], frames)
-    ours = local_map(second.traces, order, frames)
-    maps = guided(theirs, frames, held[:, order]), guided(ours, frames, held[:, order])
+    rows = (first, partner[order]), (second, order)
+    still = held[:, order]
+    upper_map, lower_map = (
+        guided(local_map(own.traces, there, frames), own.alone or own.traces, there, frames, still)
+        for own, there in rows
+    )
+    maps = upper_map, lower_map
     side = "lower" if lower.meshed else "upper"
     made = of_contacts("matching", side, points, laid_out, maps)
     return replace(made, conforming=conforming)
@@ -109,6 +113,7 @@ def _without_copies(surface: Surface, outward: np.ndarray) -> Surface:
         areas=areas,
         weights=sp.csr_matrix(M @ surface.weights),
         traces=tuple(sp.csr_matrix(M @ trace) for trace in surface.traces),
+        alone=surface.alone and tuple(sp.csr_matrix(M @ trace) for trace in surface.alone),
         held=surface.held[:, first],
         cells=own[surface.cells],
     )

@@ -66,7 +66,9 @@ def couple_surfaces(
             sp.csr_matrix(sum(part @ picked for part, picked in zip(row, mesh.picked)))
             for row in m.components(i, along)
         ]
-        maps.append(guided(local_map(traces, order, frames), frames, contacts.held[:, order]))
+        alone = [sp.csr_matrix(m.alone[i] @ picked) for picked in mesh.picked]
+        still = contacts.held[:, order]
+        maps.append(guided(local_map(traces, order, frames), alone, order, frames, still))
     side = SIDES[m.own]
     said = "contact '%s': mortar, %d contacts on the %s body '%s'"
     log.info(said, pair.name, len(order), side, carrier.name)

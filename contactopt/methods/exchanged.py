@@ -90,7 +90,8 @@ def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarr
         return own, np.zeros((0, 0))
     rows = own if problem.symmetric else slice(None)  # y'Q y = 0 if and only if Q y = 0
     columns = Q[rows][:, own] if form(Q) == "array" else Q[rows][:, own].toarray()
-    felt = np.vstack([columns / (np.abs(columns).max() or 1.0), problem.V[own].T])
+    motions = problem.V[own] / np.where(problem.reach > 0, problem.reach, 1.0)
+    felt = np.vstack([columns / (np.abs(columns).max() or 1.0), motions.T])
     sizes, directions = np.linalg.svd(felt, full_matrices=len(felt) < len(own))[1:]
     small = np.pad(sizes, (0, len(own) - len(sizes))) <= UNFELT
     return own, directions[small].T
