@@ -15,13 +15,14 @@ from contactopt.solving.solve_scene import Solved
 class Level:
     """What one solve of the search gave.
 
-    unknowns of the displacement; contacts of the interface problem value of the quantity;
-    uncertainty of its reading [its unit] error estimated, over the value [-]; None where one mesh
-    says nothing seconds wall time since the search began [s] energy_error estimated, in the energy
-    norm [-]; 0 where it is not estimated place, size of a largest value: where it was read, and the
-    size of the elements there [length] elements across the contact half-width; splits how often the
-    mesh was halved everywhere rounds of the zone loop; zone half-width that the mesh resolves
-    [length], if any
+    unknowns      of the displacement;   contacts  of the interface problem
+    value         of the quantity;   uncertainty  of its reading [its unit]
+    error         estimated, over the value [-]; None where one mesh says nothing
+    seconds       wall time since the search began [s]
+    energy_error  estimated, in the energy norm [-]; 0 where it is not estimated
+    place, size   of a largest value: where it was read, and the size of the elements there [length]
+    elements      across the contact half-width;   splits  how often the mesh was halved everywhere
+    rounds        of the zone loop;   zone  half-width that the mesh resolves [length], if any
     """
 
     unknowns: int
