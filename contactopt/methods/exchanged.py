@@ -69,7 +69,7 @@ def places(problem: InterfaceProblem) -> list[np.ndarray]:
         return []
     near = TOGETHER * np.ptp(points, axis=0).max()
     line = np.sort(points @ GENERIC[: points.shape[1]])  # no two points of a grid fall together
-    if np.min(line[1:] - line[:-1]) > 2 * near:
+    if np.min(line[1:] - line[:-1]) > GENERIC.sum() * near:
         return []
     cell = np.round(points / (near or 1.0))
     own, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)[1:]
