@@ -24,7 +24,7 @@ from contactopt.scenes.scene import HalfSpace, Part, Rigid, Support
 
 
 @dataclass
-class Reading:
+class FileContext:
     """What readers of the parts of a file share.
 
     stress     name of the unit of stress
@@ -102,7 +102,7 @@ class Reading:
         return found
 
 
-def read_body(bodies: Table, name: str, reading: Reading) -> Part | Rigid | HalfSpace:
+def read_body(bodies: Table, name: str, reading: FileContext) -> Part | Rigid | HalfSpace:
     """The body of a name in the table of bodies, in the present state."""
     body = bodies.table(name)
     rigid = body.table("rigid")
@@ -132,7 +132,7 @@ def read_body(bodies: Table, name: str, reading: Reading) -> Part | Rigid | Half
         return Part(name, mesh, made, supports, tuple(loads), contact, curve)
 
 
-def bolted(top: Table, parts: list[Any], reading: Reading) -> list[Any]:
+def bolted(top: Table, parts: list[Any], reading: FileContext) -> list[Any]:
     """The bodies with the bolts of the file."""
     bolts: list[Bolt] = []
     for table in top.tables("bolts"):
@@ -152,7 +152,7 @@ def bolted(top: Table, parts: list[Any], reading: Reading) -> list[Any]:
     return list(with_bolts(parts, bolts)) if bolts else parts
 
 
-def _half_space(name: str, body: Table, reading: Reading) -> HalfSpace:
+def _half_space(name: str, body: Table, reading: FileContext) -> HalfSpace:
     made = material_of(body, reading.materials, reading.stress)
     table = body.table("half_space")
     body.close()
@@ -166,7 +166,7 @@ def _half_space(name: str, body: Table, reading: Reading) -> HalfSpace:
         return HalfSpace(name, made, **reading.meshes[name], **motions)
 
 
-def _motions(table: Table, reading: Reading) -> dict[str, Any]:
+def _motions(table: Table, reading: FileContext) -> dict[str, Any]:
     """The total force and the displacement of a body that moves as a whole."""
     given = {key: table.table(key) for key in ("force", "displacement")}
     return {
@@ -174,7 +174,7 @@ def _motions(table: Table, reading: Reading) -> dict[str, Any]:
     }
 
 
-def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
+def _rigid(name: str, table: Table, reading: FileContext) -> Rigid:
     normal, motions = table.table("normal"), _motions(table, reading)
     values = None if normal is None else reading.numbers(normal, whole=True)
     if values is not None and not any(values.values()):
@@ -191,7 +191,7 @@ def _rigid(name: str, table: Table, reading: Reading) -> Rigid:
     )
 
 
-def _support(table: Table, mesh: Mesh, reading: Reading) -> Support:
+def _support(table: Table, mesh: Mesh, reading: FileContext) -> Support:
     what = 'a boundary, or those that meet in an edge or a point, as in "a/b"'
     name = table.take("boundary", str, needed=True, what=what)
     made = Support(name, reading.numbers(table) or None)
@@ -215,7 +215,7 @@ def _named(table: Table, key: str, name: str, mesh: Mesh, body: str) -> str:
     return name
 
 
-def _curve(table: Table | None, reading: Reading) -> Callable[[np.ndarray], np.ndarray] | None:
+def _curve(table: Table | None, reading: FileContext) -> Callable[[np.ndarray], np.ndarray] | None:
     """Projection on the circle or sphere around a centre; with fewer components, on a cylinder."""
     if table is None:
         return None
@@ -236,7 +236,7 @@ def _curve(table: Table | None, reading: Reading) -> Callable[[np.ndarray], np.n
     return project
 
 
-def function_of(table: Table, key: str, reading: Reading, needed: bool = False) -> Any:
+def function_of(table: Table, key: str, reading: FileContext, needed: bool = False) -> Any:
     """A number, or a function of the place from an expression; None if there is none."""
     what = 'a number, or a text like "0.3 + 0.1 * x"'
     table.has(key, float, str)

@@ -21,7 +21,7 @@ from contactopt.problem.laws import LAWS
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
-from contactopt.scenes.file_bodies import Reading, bolted, function_of, read_body
+from contactopt.scenes.file_bodies import FileContext, bolted, function_of, read_body
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, library, read_materials
 from contactopt.scenes.scene import Scene, check_units
@@ -105,8 +105,8 @@ def read_scenes(
 
 
 def _scene(
-    path: Path, top: Table, reading: Reading | None
-) -> tuple[Scene, dict[str, Any], Reading]:
+    path: Path, top: Table, reading: FileContext | None
+) -> tuple[Scene, dict[str, Any], FileContext]:
     kind = top.take("kind", str, "plane-strain", among=KINDS)
     units = top.table("units")
     length, stress = "length", "stress"
@@ -116,7 +116,7 @@ def _scene(
         with units.about():
             check_units((length, stress))
     materials, steps = _materials(top, path.parent), _steps(top)
-    reading = reading or Reading(path.parent, kind, length, stress, steps=steps)
+    reading = reading or FileContext(path.parent, kind, length, stress, steps=steps)
     reading.materials = materials
     bodies = top.table("bodies")
     if bodies is None or not bodies.data:
@@ -184,7 +184,7 @@ def _steps(top: Table) -> tuple[tuple[str, int], ...]:
     return tuple(found)
 
 
-def _found(top: Table, parts: list[Any], reading: Reading) -> list[Table]:
+def _found(top: Table, parts: list[Any], reading: FileContext) -> list[Table]:
     """Tables of the pairs of boundaries that face each other, which the log shows as TOML."""
     top.take("contacts", str, among=(AUTO,))
     distance = top.take("distance", float, low=0.0)
@@ -228,7 +228,7 @@ def _free(part: Any) -> Any:
     return replace(part.mesh, _boundaries=parts or free)
 
 
-def _contact(table: Table, parts: list[Any], reading: Reading) -> Contact:
+def _contact(table: Table, parts: list[Any], reading: FileContext) -> Contact:
     named = {part.name: part for part in parts}
     for side in ("upper", "lower"):
         body, _, surface = table.take(side, str, needed=True).partition(":")

@@ -15,7 +15,7 @@ from contactopt.scenes.kinds import KINDS
 
 if TYPE_CHECKING:
     from contactopt.files.toml_table import Table
-    from contactopt.scenes.file_bodies import Reading
+    from contactopt.scenes.file_bodies import FileContext
 
 
 class Given(NamedTuple):
@@ -23,7 +23,7 @@ class Given(NamedTuple):
 
     table: Table
     boundary: str
-    reading: Reading
+    reading: FileContext
 
 
 class Face(NamedTuple):
