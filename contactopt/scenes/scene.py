@@ -14,7 +14,7 @@ import numpy as np
 
 from contactopt.checks import check_number, check_size, short
 from contactopt.errors import InputError
-from contactopt.scenes.body_kinds import Body, HalfSpace, Part, Rigid, Support
+from contactopt.scenes.body_kinds import HalfSpace, Part, Rigid, Support
 from contactopt.scenes.body_shapes import LENGTHS
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.kinds import KINDS, Kind
@@ -24,7 +24,7 @@ from contactopt.scenes.loads.plate import Plate
 from contactopt.scenes.loads.pressure import Pressure
 from contactopt.scenes.loads.traction import Traction
 from contactopt.scenes.material_library import STRESSES
-from contactopt.scenes.matrix_part import MatrixPart
+from contactopt.scenes.matrix_part import AnyPart, MatrixPart
 
 if TYPE_CHECKING:
     from contactopt.analytic import Reference
@@ -81,8 +81,8 @@ class Scene:
     """
 
     name: str
-    upper: Body | MatrixPart | None = None
-    lower: Body | MatrixPart | None = None
+    upper: AnyPart | None = None
+    lower: AnyPart | None = None
     mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] | None = None
     kind: str = "plane-strain"
     thickness: float = 1.0
@@ -93,7 +93,7 @@ class Scene:
     zone: float | None = None
     units: tuple[str, str] = ("length", "stress")
     reference: Reference | None = field(default=None, compare=False)
-    bodies: tuple[Body | MatrixPart, ...] = ()
+    bodies: tuple[AnyPart, ...] = ()
     contacts: tuple[Contact, ...] = ()
     mirror: str | None = None
     state: str = ""
@@ -106,7 +106,7 @@ class Scene:
             raise self._wrong(f"unknown kind {self.kind!r}; choose from {', '.join(KINDS)}.")
         self._check_form()
         for part in self.parts:
-            if not isinstance(part, Body | MatrixPart):
+            if not isinstance(part, AnyPart):
                 raise self._wrong(
                     "a body must be a Part, a MatrixPart, a Rigid or a HalfSpace; got"
                     f" {short(part)}."
@@ -153,7 +153,7 @@ class Scene:
         return "; ".join(dict.fromkeys(pair.friction for pair in self.pairs))
 
     @property
-    def parts(self) -> tuple[Body | MatrixPart, ...]:
+    def parts(self) -> tuple[AnyPart, ...]:
         """The bodies; in the short form the upper one first."""
         if self.upper is None or self.lower is None:
             return self.bodies
@@ -333,7 +333,7 @@ def check_units(units: object) -> None:
             raise InputError(f"there is no unit of {what} {name!r}; did you mean {same[0]!r}?")
 
 
-def _curved(part: Body | MatrixPart) -> bool:
+def _curved(part: AnyPart) -> bool:
     """Whether a body has a given mesh of second order."""
     mesh = getattr(part, "mesh", None)
     if not hasattr(mesh, "nvertices"):
