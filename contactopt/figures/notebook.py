@@ -26,7 +26,8 @@ DOTS = 120  # per inch of a picture
 def result_card(result: Outcome) -> str:
     """The tables of a result, its remarks and its largest pressure, as HTML."""
     s = result.summary
-    rows, title = summary_rows(s) | remark_rows(s), f"{titled(s)}, {result.scene.friction}"
+    rows, title = summary_rows(s) | remark_rows(s), titled(s | {"scene": result.scene.name})
+    title += f", {result.scene.friction}"
     return card(title, rows, pair_rows(s)) + _pressure(result)
 
 
