@@ -162,15 +162,14 @@ def read_once(solved: Solved, name: str) -> dict[str, Any]:
     state.
     """
     quantity = find_quantity(name, solved.reduction.scene)
-    reading = read(quantity, solved)
-    size = np.inf
+    size, last = np.inf, solved if solved.path is None else _state(solved, -1)
+    reading = read(quantity, replace(solved, solution=last.solution))
     elastic = [part for part in solved.reduction.scene.parts if part.elastic]
     if all(part.meshed for part in elastic):
-        last = solved if solved.path is None else _state(solved, -1)
         errors = element_errors(last, quantity, reading.value)
         size = np.inf if errors.unsigned else errors.size
     size += reading.uncertainty
-    message = reading.missing or infinite(solved.reduction, solved.solution, reading)
+    message = reading.missing or infinite(last.reduction, last.solution, reading)
     known = np.isfinite(size) and reading.value != 0 and not message
     error = size / abs(reading.value) if known else None
     return {"value": reading.value, "error": error} | ({"message": message} if message else {})

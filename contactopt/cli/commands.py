@@ -69,11 +69,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _print_result(result: Result, out: str) -> None:
     from contactopt.figures.output import SINGLE
-    from contactopt.outcome import pair_rows, remark_rows, summary_rows, time_words
+    from contactopt.outcome import pair_rows, remark_rows, summary_rows, time_words, titled
     from contactopt.screen import in_tables
 
     s = result.summary
-    print(in_tables(s["scene"], pair_rows(s), summary_rows(s) | remark_rows(s)))
+    print(in_tables(titled(s), pair_rows(s), summary_rows(s) | remark_rows(s)))
     if (estimate := result.estimate) is not None:
         if estimate.guarantee is not None:
             print(estimate.guarantee.sentence)
