@@ -49,7 +49,7 @@ SYMMETRIC = 1e-2
 
 @dataclass(frozen=True, eq=False, init=False)
 class InterfaceProblem:
-    """Contact at k nodes in `dim` dimensions, as in the head of this module.
+    """Contact at k nodes in `dim` dimensions, as at the top of this module.
 
     Q            (k dim, k dim) compliance [length / force]: an array, a scipy sparse matrix (kept
                  as csr_array), or an InterfaceOperator that knows it by its products only. Elastic
