@@ -197,7 +197,7 @@ def states_of(
 
 
 @said_once()
-def _scene_file(scene: Any, changes: dict[str, Any]) -> SceneFile | None:
+def _scene_file(scene: str | Path | Scene, changes: dict[str, Any]) -> SceneFile | None:
     """The scene file that the name of a scene stands for, with changes of its entries; None for all
     other scenes.
     """

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from contactopt.readings.corners import infinite
 from contactopt.readings.quantities import Quantity, elastic_energy, find_quantity
 from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
+
+if TYPE_CHECKING:
+    from contactopt.scenes.scene import Part
 
 log = logging.getLogger(__name__)
 ENERGY = "energy"
@@ -133,7 +136,13 @@ def element_errors(
 
 
 def _of_shape(
-    part: Any, dim: int, body: Body, volume: np.ndarray, U: np.ndarray, W: np.ndarray, curved: float
+    part: Part,
+    dim: int,
+    body: Body,
+    volume: np.ndarray,
+    U: np.ndarray,
+    W: np.ndarray,
+    curved: float,
 ) -> np.ndarray:
     """What volumes (elements,) between facets and their curves add to the error."""
     if not np.any(volume):

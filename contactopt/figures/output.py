@@ -28,6 +28,8 @@ from contactopt.solving.restart import FILE
 from contactopt.solving.solve_scene import Solved
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from contactopt.coupling.back_to_bodies import Fields
 
 PAGE = "view.html"
@@ -54,7 +56,7 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
     """Draw bodies, the surfaces of every pair, maps and load path into files of every format."""
     from contactopt.figures import plots
 
-    def save(figure: Any, name: str) -> None:
+    def save(figure: Figure, name: str) -> None:
         for ending in formats:
             save_figure(figure, folder / f"{name}.{ending}")
 
