@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contactopt.meshes.inp_text import LARGEST, Block, set_of
+
+if TYPE_CHECKING:
+    from contactopt.meshes.inp import Scope
 
 PLANE = {
     "3": ("triangle", 3), "6": ("triangle6", 6),
@@ -98,7 +101,7 @@ def side_of(named: str, label: str, dim: int) -> tuple[tuple[int, ...], ...] | N
     return faces[first : first + 1] or None if first >= 0 else None
 
 
-def facets(scope: Any) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def facets(scope: Scope) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Blocks of facets that stand for the surfaces, whose numbers are new."""
     made = []
     most = max(dimension(named) for named in scope.types.values())
@@ -119,7 +122,7 @@ def facets(scope: Any) -> list[tuple[str, np.ndarray, np.ndarray]]:
 
 
 def _sides(
-    scope: Any, members: Iterable[int], label: str, block: Block, line: int, dim: int
+    scope: Scope, members: Iterable[int], label: str, block: Block, line: int, dim: int
 ) -> list[np.ndarray]:
     """Corners of the sides of elements that a row of a surface means."""
     found = []

@@ -40,7 +40,7 @@ def motion(block: Block, rows: list[Row]) -> Callable[[np.ndarray], np.ndarray]:
     return lambda x: np.asarray(turn.apply(x + shift - centre) + centre if len(x) else x)
 
 
-def system(scope: Any, block: Block) -> None:
+def system(scope: Scope, block: Block) -> None:
     """Coordinates of nodes are from now on those in other directions from another origin."""
     values = [[block.real(line, word) for word in words] for line, words in block.rows]
     first, second = [*values, [], []][:2]
@@ -58,7 +58,7 @@ def system(scope: Any, block: Block) -> None:
     scope.frame = origin, turn
 
 
-def places(scope: Any, block: Block, rows: list[list[float]]) -> np.ndarray:
+def places(scope: Scope, block: Block, rows: list[list[float]]) -> np.ndarray:
     """Places (n, 3) from coordinates, which may be those of a cylinder, in the frame."""
     x = np.array(rows, dtype=float).reshape(-1, 3)
     kind = block.options.get("system", "R").upper()
