@@ -34,7 +34,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg as la
@@ -53,6 +53,9 @@ from contactopt.scenes.loads import Load
 from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.follow import follow_path
 from contactopt.solving.solve_scene import Options
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 GROWTH = 4.0  # of the prescribed motion from push to push
 EARLY = 6  # pushes that need not be solved while the motion is small
@@ -154,7 +157,7 @@ def _rows(scene: Scene) -> dict[str, tuple[float, bool]]:
     return found
 
 
-def _place(part: Any, load: Load) -> str:
+def _place(part: AnyPart, load: Load) -> str:
     """What stands before the component in the name of a load."""
     if load.shared:
         return ":".join(("bolt", *load.address(part.name)))

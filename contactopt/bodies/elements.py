@@ -100,7 +100,7 @@ def make_basis(mesh: skfem.Mesh, degree: int, axisymmetric: bool) -> skfem.CellB
 
 
 def with_jacobians(
-    mapping: skfem.mapping.Mapping, X: np.ndarray, elements: Any
+    mapping: skfem.mapping.Mapping, X: np.ndarray, elements: slice | np.ndarray
 ) -> skfem.mapping.Mapping:
     """The mapping that knows its Jacobians at places X, (dim, q) or (dim, element, q), of elements.
 

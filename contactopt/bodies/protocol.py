@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from contactopt.linear.convolution import Kernel
     from contactopt.linear.operators import Product
     from contactopt.linear.saddle_point import BodyTerm
+    from contactopt.scenes.scene import Scene
 
 
 class FreeMotions(NamedTuple):
@@ -111,7 +112,7 @@ class Body(ABC):
 
     @abstractmethod
     def displacement(
-        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+        self, force: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None = None
     ) -> np.ndarray:
         """The displacement U (n,) [length] under contact forces (n,) [force] and multipliers (p,)
         of the free motions [length].
@@ -128,7 +129,7 @@ class Body(ABC):
         """
 
     @abstractmethod
-    def loaded(self, scene: Any, part: Any) -> Body:
+    def loaded(self, scene: Scene, part: Any) -> Body:
         """The same body under the loads of another scene, whose part stands for it; InputError if
         more than load values differ.
         """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,10 @@ from contactopt.problem import (
 )
 from contactopt.problem.certificate import Moved
 from contactopt.problem.scaling import immovable, scales_of, without_rounding
+
+if TYPE_CHECKING:
+    from scipy.sparse import spmatrix
+    from scipy.sparse.linalg import LinearOperator
 
 CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
 NEAR = 1e-6  # distance to a kink, over the largest force, within which a contact is weakly active
@@ -57,7 +61,7 @@ class Dual:
     def mu(self) -> np.ndarray:
         return self.by_parameter()
 
-    def along_Q(self, change: Any) -> float:
+    def along_Q(self, change: spmatrix | LinearOperator | np.ndarray) -> float:
         """df for a change of Q: an array, a sparse matrix, or an operator with products."""
         return float(self.q.ravel() @ np.asarray(change @ self.reactions.ravel()))
 
@@ -152,7 +156,7 @@ class Sensitivity:
         q: ArrayLike | None = None,
         mu: ArrayLike | None = None,
         s: ArrayLike | None = None,
-        Q: Any = None,
+        Q: spmatrix | LinearOperator | np.ndarray | None = None,
         V: ArrayLike | None = None,
     ) -> Change:
         """The change of the solution along a direction of q (k, dim), mu (k,) or a number, s (p,),
@@ -299,7 +303,9 @@ def _given(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> np.nda
     return np.broadcast_to(array, shape) if array.ndim == 0 else _shaped(name, array, shape)
 
 
-def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> Any:
+def _shaped(
+    name: str, value: spmatrix | LinearOperator | np.ndarray, shape: tuple[int, ...]
+) -> spmatrix | LinearOperator | np.ndarray:
     if getattr(value, "shape", None) != shape:
         raise InputError(
             f"{name} must have the shape {shape}; got"

@@ -241,7 +241,7 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
     return float(total)
 
 
-def chain_of(result: Any, distance: float | None = None) -> Chain:
+def chain_of(result: object, distance: float | None = None) -> Chain:
     """The solved states of a result, to differentiate through. InputError for a result without a
     solved scene, and for a state that is not certified.
     """

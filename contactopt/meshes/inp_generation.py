@@ -7,12 +7,15 @@ Source: Abaqus keywords reference manual.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from contactopt.meshes.inp_text import Block, Row, bare, set_of
+
+if TYPE_CHECKING:
+    from contactopt.meshes.inp import Scope
 
 STRAIGHT = 1e-9  # sine of the angle below which two directions span no plane
 
@@ -46,13 +49,13 @@ def _whole(block: Block, line: int, words: list[str], defaults: list[int | None]
     return [block.whole(line, word) if word else usual or 0 for word, usual in zip(given, defaults)]
 
 
-def _node(scope: Any, block: Block, line: int, tag: int) -> np.ndarray:
+def _node(scope: Scope, block: Block, line: int, tag: int) -> np.ndarray:
     if tag not in scope.nodes:
         raise block.fail(f"there is no node {tag}", line)
     return np.array(scope.nodes[tag])
 
 
-def _put(scope: Any, block: Block, tags: list[int], places: np.ndarray, name: str) -> None:
+def _put(scope: Scope, block: Block, tags: list[int], places: np.ndarray, name: str) -> None:
     """Add nodes, to a set if it has a name."""
     if any(tag < 1 for tag in tags):
         raise block.fail("numbers of nodes begin with 1")
@@ -61,7 +64,7 @@ def _put(scope: Any, block: Block, tags: list[int], places: np.ndarray, name: st
         set_of(scope.node_sets, name).update(dict.fromkeys(tags))
 
 
-def ngen(scope: Any, block: Block) -> None:
+def ngen(scope: Scope, block: Block) -> None:
     """Nodes on a straight line or on an arc between two nodes."""
     line_of = block.options.get("line", "").upper()
     if line_of not in ("", "C"):
@@ -79,7 +82,13 @@ def ngen(scope: Any, block: Block) -> None:
         _put(scope, block, tags, places, block.options.get("nset", ""))
 
 
-def _arc(scope: Any, block: Block, line: int, words: list[str], ends: Any) -> np.ndarray:
+def _arc(
+    scope: Scope,
+    block: Block,
+    line: int,
+    words: list[str],
+    ends: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> np.ndarray:
     """Places on the arc around a node or a place; a normal says which way if it is long."""
     a, b, t = ends
     values = [block.real(line, word) for word in (*words[4:], *[""] * 6)[:6]]
@@ -103,7 +112,7 @@ def _arc(scope: Any, block: Block, line: int, words: list[str], ends: Any) -> np
     return np.asarray(centre + turned * (1 + t * (sizes[1] / sizes[0] - 1)))
 
 
-def nfill(scope: Any, block: Block) -> None:
+def nfill(scope: Scope, block: Block) -> None:
     """Nodes on straight lines between the nodes of two sets."""
     for line, words in block.rows:
         if len(words) < 3:
@@ -120,12 +129,12 @@ def nfill(scope: Any, block: Block) -> None:
             _put(scope, block, tags, ends[0] + k / count * (ends[1] - ends[0]), name)
 
 
-def _in_order(scope: Any, block: Block, line: int, word: str) -> list[int]:
+def _in_order(scope: Scope, block: Block, line: int, word: str) -> list[int]:
     found = list(scope.numbers(word, "node_sets", block, line))
     return found if bare(word) in scope.unsorted else sorted(found)
 
 
-def ncopy(scope: Any, block: Block) -> None:
+def ncopy(scope: Scope, block: Block) -> None:
     """Copies of nodes, moved or reflected."""
     by = block.whole(block.line, block.need("changenumber"))
     old = list(scope.numbers(block.need("oldset"), "node_sets", block))
@@ -159,7 +168,7 @@ def _reflected(block: Block, kind: str, x: np.ndarray) -> np.ndarray:
     return np.asarray(x - 2 * off if kind == "MIRROR" else 2 * (a + off) - x)
 
 
-def elgen(scope: Any, block: Block) -> None:
+def elgen(scope: Scope, block: Block) -> None:
     """Rows and layers of elements like one that is there."""
     for line, words in block.rows:
         usual: list[int | None] = [None, 1, 1, 1, 1, 1, 1, 1, 1, 1]
@@ -183,7 +192,7 @@ def _at(ids: np.ndarray, number: int) -> list[int]:
     return list(np.flatnonzero(ids == number))
 
 
-def elcopy(scope: Any, block: Block) -> None:
+def elcopy(scope: Scope, block: Block) -> None:
     """Copies of elements on other nodes."""
     by, nodes_by = (block.whole(block.line, block.need(o)) for o in ("elementshift", "shiftnodes"))
     old = np.fromiter(scope.numbers(block.need("oldset"), "element_sets", block), np.int64)
