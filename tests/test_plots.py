@@ -33,7 +33,7 @@ def test_every_axis_is_labelled_with_its_unit(name, elements):
     assert all("[" in label and "]" in label for label in labels)
     if result.scene.dim == 3:  # the axes of a picture of solids are drawn in it
         texts = {text.get_text() for text in bodies.texts}
-        assert {"$x$ [mm]", "$y$ [mm]", "$z$ [mm]"} <= texts
+        assert {"x [mm]", "y [mm]", "z [mm]"} <= texts
 
 
 def test_a_users_scene_is_not_labelled_with_our_units():

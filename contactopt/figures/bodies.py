@@ -56,7 +56,7 @@ def deformed(
         ax = _draw_solid(scene, fields, scale, top, ax)
     else:
         ax = _draw_section(scene, fields, scale, top, ax, _mirror_plane(scene, problem))
-    times = rf", displacements $\times$ {scale:g}" if scale != 1 else ""
+    times = f", displacements × {scale:g}" if scale != 1 else ""
     title = f"{scene.name}, {symbols(scene.friction)}{times}"
     ax.set_title(title, fontsize=ax.xaxis.label.get_size())
     return ax
@@ -126,7 +126,7 @@ def _draw_section(
     across, up = scene.components
     ax.autoscale_view()
     length = scene.units[0]
-    ax.set(xlabel=f"${across}$ [{length}]", ylabel=f"${up}$ [{length}]", aspect="equal")
+    ax.set(xlabel=f"{across} [{length}]", ylabel=f"{up} [{length}]", aspect="equal")
     reach = _reach(scene, fields)
     if reach is not None:
         ax.set(xlim=(-reach, reach), ylim=(-0.9 * reach, 0.6 * reach))
@@ -172,7 +172,7 @@ def _draw_solid(scene: Scene, fields: Sequence[Fields], scale: float, top: float
     corners, values, lined = (np.concatenate(parts) for parts in zip(*drawn))
     image, extent = picture(corners @ view, values, lined, shade.to_rgba, PIXELS)
     ax.imshow(image, extent=extent, origin="lower", aspect="equal", zorder=2)
-    names = [f"${name}$ [{scene.units[0]}]" for name in scene.components]
+    names = [f"{name} [{scene.units[0]}]" for name in scene.components]
     draw_frame(ax, view, corners.min(axis=(0, 1)), corners.max(axis=(0, 1)), names)
     ax.set_axis_off()
     ax.margins(0.12)

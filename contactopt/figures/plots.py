@@ -80,8 +80,8 @@ def _in_rows(problem: InterfaceProblem) -> bool:
 def _place_names(scene: Scene, problem: InterfaceProblem) -> tuple[str, str]:
     """What the places along the contact line are, a coordinate or arc length, and where it is."""
     if problem.dim == 3:
-        return "$x$", ", $y$ = 0"
-    return f"${scene.components[0]}$" if _straight(problem) else "arc length $s$", ""
+        return "x", ", y = 0"
+    return scene.components[0] if _straight(problem) else "arc length s", ""
 
 
 def _straight(problem: InterfaceProblem) -> bool:
@@ -120,10 +120,10 @@ def pressure(
         label = f"exact: {scene.reference.label}"
         ax.plot(fine / unit, exact, color=ORANGE, label=label, zorder=1)
     name, where = _place_names(scene, problem)
-    over_a = f"{name} / $a$ [-]{where}, $a$ = {a:.4g} {length}"
+    over_a = f"{name} / a [-]{where}, a = {a:.4g} {length}"
     ax.set(
         xlabel=over_a if scaled else f"{name} [{length}]{where}",
-        ylabel=rf"pressure $p\,/\,\bar{{p}}$ [-], $\bar{{p}}$ = {mean:.4g} {stress}",
+        ylabel=f"pressure / mean [-], mean = {mean:.4g} {stress}",
         ylim=(0, 5.0 if _singular(scene) else 1.15 * float((p / mean).max() or 1.0)),
     )
     ax.set_xlim(*_shown(problem, solution, place, unit))
@@ -174,7 +174,7 @@ def traction(
     bound = problem.law.bound_along(solution.reactions)[line] / problem.areas[line]
     bound[np.isinf(bound)] = 0.0  # glued contacts have none
     status = contact_status(problem, solution.reactions)
-    ax.plot(x, bound, color=GREY, ls="--", label=r"bound $\pm\mu p$")
+    ax.plot(x, bound, color=GREY, ls="--", label="bound ± μ p")
     ax.plot(x, -bound, color=GREY, ls="--")
     ax.plot(x, t, color=BLUE)
     if scene.reference is not None and scene.reference.shear is not None:
@@ -217,7 +217,7 @@ def _plane(scene: Scene, problem: InterfaceProblem, ax: Axes) -> None:
     """Name the axes of a surface in 3D, which are x and y where it lies across z."""
     places, unit = problem.chart.places, scene.units[0]
     flat = np.allclose(places, problem.coordinates[:2], atol=STRAIGHT * np.ptp(places))
-    first, second = ("$x$", "$y$") if flat else ("$s$ on the surface", "$t$ on the surface")
+    first, second = ("x", "y") if flat else ("s on the surface", "t on the surface")
     ax.set(xlabel=f"{first} [{unit}]", ylabel=f"{second} [{unit}]", aspect="equal")
 
 
@@ -299,13 +299,13 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
         values = np.where(where, known, np.nan)
         if line:
             ax.plot(problem.chart.places[0], values)
-            ax.set(xlabel=f"${scene.components[0]}$ [{length}]", ylabel=label)
+            ax.set(xlabel=f"{scene.components[0]} [{length}]", ylabel=label)
             continue
         x, y = problem.chart.places
         extent = (x.min(), x.max(), y.min(), y.max())
         look = {"origin": "lower", "interpolation": "nearest", "cmap": colours}
         image = ax.imshow(values.T, extent=extent, **look)
-        ax.set(xlabel=f"$x$ [{length}]", ylabel=f"$y$ [{length}]")
+        ax.set(xlabel=f"x [{length}]", ylabel=f"y [{length}]")
         bar = add_colours(image, ax, label, orientation="horizontal", shrink=1.0)
         if name == "status":
             image.set_clim(0.5, 2.5)

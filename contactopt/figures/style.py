@@ -55,8 +55,8 @@ def highest_colour(stresses: list[np.ndarray]) -> float:
 
 
 def symbols(text: str) -> str:
-    """A text with the letter mu set as a symbol."""
-    return re.sub(r"\bmu\b", r"$\\mu$", text)
+    """A text with the letter mu set as a symbol, as a letter: formulas take long to set."""
+    return re.sub(r"\bmu\b", "μ", text)
 
 
 def make_axes(ax: Axes) -> Any:

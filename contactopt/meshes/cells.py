@@ -66,11 +66,11 @@ def elements_of(mesh: skfem.Mesh) -> tuple[str, np.ndarray]:
     """List the elements of a mesh of first or second order: their name, a value of CELLS, and their
     nodes (e, v) in the order of VTK, numbered so that volumes are positive.
     """
-    from skfem.io.meshio import HEX_MAPPING
-
     nodes = np.array(mesh.dofs.element_dofs)
     names = CELLS[mesh.refdom.__name__]
     if names[0] == "hexahedron":
+        from skfem.io.meshio import HEX_MAPPING
+
         nodes = nodes[HEX_MAPPING[: len(nodes)]]
     # the edges that meet at the first corner span a positive volume
     ends = {"triangle": [1, 2], "quad": [1, 3], "tetra": [1, 2, 3], "hexahedron": [1, 3, 4]}

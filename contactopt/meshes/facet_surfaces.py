@@ -22,7 +22,6 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 from skfem import Mesh
@@ -257,6 +256,8 @@ def _cylinder(places: np.ndarray, normals: np.ndarray, near: float) -> Shape | N
         flat = section(tilt) @ x
         centre, radius = fitted_sphere(section(tilt) @ few)
         return np.asarray(np.linalg.norm(flat - centre, axis=0) - radius)
+
+    from scipy.optimize import least_squares  # late, since it takes long to import
 
     size = np.ptp(places, axis=1).max()
     best = least_squares(

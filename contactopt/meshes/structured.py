@@ -6,7 +6,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.optimize import brentq
 from skfem import Mesh, MeshHex, MeshQuad, MeshTet, MeshTri
 
 from contactopt.checks import check_memory
@@ -17,6 +16,7 @@ MOST_CELLS = 2e7  # of one mesh
 NEEDED = 6e3  # bytes of memory that a run takes for each cell, at least
 # shortest cell over the length of a grid; below it, places of nodes are lost in rounding
 FINEST = 1e-8
+ROUNDING = 1e-15  # relative
 # a direction that no usual edge or diagonal of a cell is perpendicular to
 LEAN = np.array([np.sqrt(3), np.sqrt(2), -1.0])
 
@@ -35,10 +35,13 @@ def graded(length: float, first: float, growth: float) -> np.ndarray:
         return np.linspace(0.0, length, int(np.ceil(length / first - 1e-9)) + 1)
     powers = np.arange(cells)
 
-    def excess(ratio: float) -> float:
-        return float(first * np.sum(ratio**powers) - length)
+    def step(ratio: float) -> float:  # Newton's, which falls to the root since the sum is convex
+        excess = np.sum(ratio**powers) - length / first
+        return float(excess / (powers @ ratio ** (powers - 1.0)))
 
-    ratio = brentq(excess, 1.0, growth * (1 + 1e-12)) if excess(growth) > 0 else growth
+    ratio = growth
+    while (change := step(ratio)) > ROUNDING * ratio:
+        ratio -= change
     grid = np.append(0.0, np.cumsum(first * ratio**powers))
     return np.asarray(grid * (length / grid[-1]))
 

@@ -12,8 +12,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq, nnls
-from scipy.special import ellipe, ellipkm1
 
 from contactopt.coupling.posed import Posed
 from contactopt.problem import InterfaceProblem
@@ -54,6 +52,9 @@ class Hertz(NamedTuple):
 
 def ellipse(force: float, modulus: float, small: float, large: float) -> tuple[float, ...]:
     """The half-widths of a contact with two relative curvatures [1 / length], the larger first."""
+    from scipy.optimize import brentq  # late, since it takes long to import
+    from scipy.special import ellipe, ellipkm1
+
     if large <= ROUND * small:
         return ((3 * force / (2 * modulus * (small + large))) ** (1 / 3),)
 
@@ -71,6 +72,8 @@ def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz
     """The prediction for each pair that is curved and whose force statics give, by its name; `free`
     has the rigid motions that supports leave.
     """
+    from scipy.optimize import nnls  # late, since it takes long to import
+
     pairs = zip(free.pairs, posed.couplings)
     nearest = [pair.contacts.start + int(np.argmin(made.gap)) for pair, made in pairs]
     work = free.V.reshape(free.contacts, scene.dim, -1)[nearest, 0]  # (pairs, motions)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 
 import numpy as np
-from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from contactopt.coupling.reduction import Reduction
@@ -123,6 +122,8 @@ def largest_around(problem: InterfaceProblem, sizes: np.ndarray) -> np.ndarray:
     if grid is None:
         return np.asarray(sizes[neighbours(problem)].max(axis=1))
     side = round(NEIGHBOURS[problem.dim] ** (1 / len(grid)))
+    from scipy.ndimage import maximum_filter  # late, since it takes long to import
+
     return np.asarray(maximum_filter(sizes.reshape(grid), side, mode="nearest").ravel())
 
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from itertools import islice
 
 import numpy as np
-from scipy.ndimage import binary_dilation
 
 from contactopt.methods import constants, find_method
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
@@ -51,6 +50,8 @@ def _worst(level: Level, at: Evaluation) -> np.ndarray:
         return largest[:0]
     marked = np.zeros(len(size), dtype=bool)
     marked[largest[:count]] = True
+    from scipy.ndimage import binary_dilation  # late, since it takes long to import
+
     wide = binary_dilation(marked.reshape(level.kernel.grid), iterations=constants.AROUND).ravel()
     return np.flatnonzero(wide if np.count_nonzero(wide) <= most else marked)
 
