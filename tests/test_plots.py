@@ -112,11 +112,11 @@ def test_a_figure_as_pdf_is_one_column_wide_and_says_a_status_only_if_it_failed(
     save_figure(figure, tmp_path / "a.pdf")
     box = re.search(rb"MediaBox \[([\d. ]+)\]", (tmp_path / "a.pdf").read_bytes())
     assert float(box[1].split()[2]) == pytest.approx(72 * COLUMN, abs=0.1)
-    assert figure.get_suptitle() == r"punch-2d, $\mu$ = 0.5"
+    assert figure.get_suptitle() == "punch-2d, μ = 0.5"
     assert all(ax.get_legend() is None or _above(ax) for ax in figure.axes)
     failed = replace(result.solution, status=solve(result.problem, "nsgs", max_iterations=1).status)
     words = plots.contact_figure(result.scene, result.problem, failed).get_suptitle()
-    assert words.startswith(r"punch-2d, $\mu$ = 0.5: ")
+    assert words.startswith("punch-2d, μ = 0.5: ")
 
 
 def _above(ax):
