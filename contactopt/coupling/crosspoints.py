@@ -328,7 +328,7 @@ def _without(made: Coupling, kept: np.ndarray) -> Coupling:
         positions=made.positions[:, number],
         chart=replace(chart, places=chart.places[:, number], cells=cells, grid=None),
         cells=left(made.cells),
-        share=None if made.share is None else made.share[number],
+        share=None if made.share is None else 1 / (M @ (1 / made.share)),  # new area over the faces'
     )
 
 

@@ -192,7 +192,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, nodes, x, normals)
     if first == 1:
         weights, alone = weights[::-1], alone[::-1]
-    share = sums.areas / full[nodes]
+    share = sums.areas / sums.full
     return Mortar(first, nodes, sums.areas, n, gap, x, share, weights, alone, lever, carried)
 
 
