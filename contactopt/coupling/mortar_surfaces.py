@@ -84,7 +84,7 @@ def couple_surfaces(
             f" {loose:.2g} contacts for each of its nodes, so that it can bulge between them; take"
             f" carrier = '{other}', or a finer mesh of the {side} body."
         )
-        return replace(made, remarks=(said,))
+        return replace(made, thin=said)
     return made
 
 
