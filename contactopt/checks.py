@@ -18,6 +18,7 @@ import numpy as np
 from contactopt.errors import InputError
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
     from skfem import Mesh
 
 RESERVED = {
@@ -97,7 +98,7 @@ def _free_memory() -> float:
     return found
 
 
-def given(value: Any) -> bool:
+def given(value: ArrayLike) -> bool:
     """Whether an optional array has an entry; what no array can be made of counts as given."""
     try:
         return np.size(value) > 0
@@ -117,7 +118,7 @@ def check_count(name: str, value: int) -> None:
         raise InputError(f"{name} must be a whole number of at least 1; got {value!r}.")
 
 
-def real_array(name: str, value: Any) -> np.ndarray:
+def real_array(name: str, value: object) -> np.ndarray:
     """Copy a number, a list of any depth or an array into an array of finite floats. InputError,
     which calls the value `name`, on text, rows of different lengths, complex numbers, and numbers
     that are not finite.

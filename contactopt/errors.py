@@ -1,6 +1,11 @@
 """The exceptions of contactopt, all with a message meant for the person at the keyboard."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from contactopt.solving.paths import PathResult
 
 
 class InputError(ValueError):
@@ -13,7 +18,7 @@ class Unbalanced(InputError):
     path  the states of the load path before it, a contactopt.solving.paths.PathResult, if any
     """
 
-    path: Any = None
+    path: PathResult | None = None
 
 
 class BackendError(RuntimeError):

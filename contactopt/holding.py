@@ -34,7 +34,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg as la
@@ -53,6 +53,9 @@ from contactopt.scenes.loads import Load
 from contactopt.scenes.scene import Part, Scene
 from contactopt.solving.follow import follow_path
 from contactopt.solving.solve_scene import Options
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 GROWTH = 4.0  # of the prescribed motion from push to push
 EARLY = 6  # pushes that need not be solved while the motion is small
@@ -109,8 +112,8 @@ def limit(
     ----------
     scene : as for contactopt.run
     load : which load grows, as BODY:BOUNDARY:COMPONENT, or all those that begin with BODY or
-        BODY:BOUNDARY; BODY:body_force, bolt:NAME and, of a body without a mesh, BODY:force. None:
-        what the last step of the load path changes
+        BODY:BOUNDARY; or BODY:body_force, or bolt:NAME. A body without a mesh has BODY:force. With
+        None the loads grow that the last step of the load path changes
     note : receives progress messages
     changes : as for contactopt.run
 
@@ -154,7 +157,7 @@ def _rows(scene: Scene) -> dict[str, tuple[float, bool]]:
     return found
 
 
-def _place(part: Any, load: Load) -> str:
+def _place(part: AnyPart, load: Load) -> str:
     """What stands before the component in the name of a load."""
     if load.shared:
         return ":".join(("bolt", *load.address(part.name)))

@@ -61,7 +61,13 @@ class Kink(UserWarning):
 
 
 def solve(
-    Q: Any, q: Any, mu: Any, V: Any = None, s: Any = None, tol: float = TOL, **settings: Any
+    Q: jax.Array,
+    q: jax.Array,
+    mu: jax.Array,
+    V: jax.Array | None = None,
+    s: jax.Array | None = None,
+    tol: float = TOL,
+    **settings: Any,
 ) -> tuple[jax.Array, jax.Array]:
     """Solve an interface problem with Coulomb friction, differentiably by Q (k dim, k dim) [length
     / force], q (k, dim) [length], mu, one number or (k,), and the motions V (k dim, p) and
@@ -87,7 +93,7 @@ def solve(
 def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
     """The function of Q, q, mu, V and s, made once so that JAX traces it once."""
 
-    def found(data: Any) -> list[Sensitivity]:
+    def found(data: Arrays) -> list[Sensitivity]:
         """One problem, or many under `vmap`, which puts axes before those of each array."""
         before = np.shape(data[1])[:-2]
         shapes = [(prod(before), *np.shape(array)[len(before) :]) for array in data]
@@ -106,15 +112,15 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
                 raise InputError(f"no certified solution was found: {solution.status}.")
         return [Sensitivity(p, x, told_apart(x.residual)) for p, x in zip(problems, solutions)]
 
-    def shaped(results: list[Arrays], data: Any) -> Arrays:
+    def shaped(results: list[Arrays], data: Arrays) -> Arrays:
         before = np.shape(data[1])[:-2]
         return tuple(np.reshape(parts, (*before, *np.shape(parts[0]))) for parts in zip(*results))
 
-    def solved(*data: Any) -> Arrays:
+    def solved(*data: Arrays) -> Arrays:
         points = [(at.solution.reactions, at.solution.multipliers) for at in found(data)]
         return shaped(points, data)
 
-    def linearised(*data: Any) -> Arrays:
+    def linearised(*data: Arrays) -> Arrays:
         results: list[Arrays] = []
         for at in map(_smooth, found(data)):
             tangent, by_mu = at.tangent, np.broadcast_to(at.by_parameter, at.problem.q.shape)
@@ -125,7 +131,7 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
             results.append((*point, tangent.rho, tangent.D, by_mu, *whole))
         return shaped(results, data)
 
-    def rule(data: Any, changes: Any) -> Any:
+    def rule(data: Arrays, changes: Arrays) -> Any:
         _, q, mu, _, s = data
         (k, d), m = q.shape, q.size + s.size
         numbers = jnp.zeros(m, int)
@@ -140,7 +146,14 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
 
 
 def _change(
-    data: Any, changes: Any, r: Any, lam: Any, rho: Any, D: Any, by_mu: Any, *whole: Any
+    data: Arrays,
+    changes: Arrays,
+    r: jax.Array,
+    lam: jax.Array,
+    rho: jax.Array,
+    D: jax.Array,
+    by_mu: jax.Array,
+    *whole: jax.Array,
 ) -> tuple[jax.Array, jax.Array]:
     """dr and dlambda of contactopt.derivatives for changes of Q, q, mu, V and s, linear in them."""
     (Q, q, _, V, _), (dQ, dq, dmu, dV, ds) = data, changes
@@ -184,7 +197,7 @@ def _inverse(whole: Whole) -> tuple[Callable[..., Any], Callable[..., Any]]:
 
 
 def quantity(
-    scene: str | Path | Scene, name: Any, parameters: str | Sequence[str], **options: Any
+    scene: str | Path | Scene, name: str, parameters: str | Sequence[str], **options: Any
 ) -> Callable[[Any], jax.Array]:
     """A function of JAX from the values (j,) of parameters of a scene to a quantity of its
     solution. Both have the names of contactopt.gradient, and the options are those of
@@ -200,26 +213,26 @@ def quantity(
     for one in which:
         one.read(base)  # refuses what has no value to change
 
-    def changed(values: Any) -> Any:
+    def changed(values: jax.Array) -> Any:
         numbers = np.asarray(values).tolist()
         return run(put_all(base, dict(zip(which, numbers))), **options)
 
-    def read(values: Any) -> np.ndarray:
+    def read(values: jax.Array) -> np.ndarray:
         return np.asarray(seeds_of(name, chain_of(changed(values)).steps[-1]).value, float)
 
-    def both(values: Any) -> Arrays:
+    def both(values: jax.Array) -> Arrays:
         at = _smooth(gradient(changed(values), name, names))
         return np.asarray(at.value, float), np.array([float(at.by[one]) for one in names])
 
     act = jax.custom_jvp(lambda values: _outside(read, jnp.zeros(()), "sequential", values))
 
-    def rule(values: Any, changes: Any) -> Any:
+    def rule(values: jax.Array, changes: Arrays) -> Any:
         value, by = _outside(both, (jnp.zeros(()), *values), "sequential", *values)
         return value, by @ changes[0]
 
     act.defjvp(rule)
 
-    def function(values: Any) -> jax.Array:
+    def function(values: jax.Array) -> jax.Array:
         array = jnp.asarray(values, float)
         if array.shape != (len(names),):
             raise InputError(
@@ -231,13 +244,13 @@ def quantity(
     return function
 
 
-def _outside(act: Callable[..., Any], like: Any, vmap: str, *arrays: Any) -> Any:
+def _outside(act: Callable[..., Any], like: Any, vmap: str, *arrays: jax.Array) -> Arrays:
     """Call a function of NumPy from JAX; its results have the shapes of `like`."""
     shapes = jax.tree.map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype), like)
     return jax.pure_callback(act, shapes, *arrays, vmap_method=vmap)
 
 
-def _smooth(at: Any) -> Any:
+def _smooth(at: jax.Array) -> jax.Array:
     """A sensitivity or a gradient; a warning where it is not differentiable."""
     if not at.differentiable:
         warnings.warn(at.sentence, Kink, stacklevel=2)

@@ -40,7 +40,9 @@ class Outcome:
     asked for, and `total` of the whole run.
 
     `path` holds all states of a scene that has a load path; the rest is then that of the last
-    state. `estimate` is what refinement to an asked accuracy found.
+    state. Where a step of it was not solved, `solution` says how that step ended, and `shown` is
+    the solution of the state before, whose numbers, figures and files are shown. `estimate` is what
+    refinement to an asked accuracy found.
     """
 
     scene: Scene
@@ -57,21 +59,26 @@ class Outcome:
         states = "" if self.path is None else count(len(self.path.states), "state")
         contacts, residual = count(s["contact_nodes"], "contact"), f"residual {s['residual']:.1e}"
         aim = "" if self.estimate is None else repr(self.estimate)
-        return line("Result", self.scene.name, s["status"], residual, contacts, states, aim)
+        return line("Result", titled(s), s["status"], residual, contacts, states, aim)
 
     @property
     def problem(self) -> InterfaceProblem:
         return self.reduction.problem
 
     @property
+    def shown(self) -> Solution:
+        """The solution that numbers, figures and files are of."""
+        return self.solution if self.path is None else self.path.states[-1].solution
+
+    @property
     def pressure(self) -> np.ndarray:
         """Contact pressure at the contact nodes, (k,) [stress]."""
-        return np.asarray(self.solution.reactions[:, 0] / self.problem.areas)
+        return np.asarray(self.shown.reactions[:, 0] / self.problem.areas)
 
     @property
     def traction(self) -> np.ndarray:
         """Tangential traction on the upper body, (k,) or in 3D (k, 2) [stress]."""
-        return squeeze(self.solution.reactions[:, 1:] / self.problem.areas[:, None])
+        return squeeze(self.shown.reactions[:, 1:] / self.problem.areas[:, None])
 
 
 def squeeze(t: np.ndarray) -> np.ndarray:
@@ -87,6 +94,12 @@ def _number(value: float | None, form: str = ".6g") -> str:
 def _measured(value: float, quantity: str, summary: dict[str, Any]) -> str:
     """The value of a quantity with its unit."""
     return f"{_number(value)} {unit_of(quantity, tuple(summary['units']))}".rstrip()
+
+
+def titled(summary: dict[str, Any]) -> str:
+    """The name of the scene, with the state whose numbers follow where a later one failed."""
+    shown = summary.get("shown")
+    return f"{summary['scene']}, {shown}, the last one solved" if shown else str(summary["scene"])
 
 
 def pair_rows(summary: dict[str, Any]) -> list[tuple[str, ...]]:
@@ -152,9 +165,14 @@ def _trust(summary: dict[str, Any]) -> dict[str, str]:
         count(summary["contact_nodes"], "contact"),
         products,
     )
-    return {
-        "status": f"{summary['status']}{why}: certificate {_number(summary['residual'], '.1e')},"
-        f" {summary['method']}{by}, {count(summary['outer_iterations'], 'iteration')}",
+    certificate = (
+        f"certificate {_number(summary['residual'], '.1e')}, {summary['method']}{by},"
+        f" {count(summary['outer_iterations'], 'iteration')}"
+    )
+    shown = summary.get("shown")
+    before = {shown: f"solved: {certificate}"} if shown else {}
+    return before | {
+        "status": f"{summary['status']}{why}" + ("" if shown else f": {certificate}"),
         "model": ", ".join(filter(None, model)),
     }
 

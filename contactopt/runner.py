@@ -14,6 +14,7 @@ import numpy as np
 
 from contactopt.checks import meant, overheard, said_once
 from contactopt.coupling.back_to_bodies import recover
+from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, not_drawable, write
 from contactopt.figures.style import FORMATS
@@ -23,6 +24,7 @@ from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
+from contactopt.problem import Solution
 from contactopt.readings.chords import chord_remarks
 from contactopt.readings.corners import corner_remarks
 from contactopt.readings.peaks import pressure_reading
@@ -104,7 +106,7 @@ def run(
     changes : to the arguments of a named scene, such as `elements`, or to the fields of a Scene
 
     Options from `method` to `max_memory` may stand in a scene file; those given here win. None
-    stands for what is usual.
+    means the default.
 
     Returns
     -------
@@ -195,7 +197,7 @@ def states_of(
 
 
 @said_once()
-def _scene_file(scene: Any, changes: dict[str, Any]) -> SceneFile | None:
+def _scene_file(scene: str | Path | Scene, changes: dict[str, Any]) -> SceneFile | None:
     """The scene file that the name of a scene stands for, with changes of its entries; None for all
     other scenes.
     """
@@ -288,38 +290,37 @@ def _result(
     """The result with the fields of the bodies; `names` are of the method and its backends, and
     `told` are remarks made before.
     """
-    reduction, solution = solved.reduction, solved.solution
-    seconds = dict(solution.seconds)
+    reduction, ended, path = solved.reduction, solved.solution, solved.path
+    solution = path.states[-1].solution if path else ended
+    seconds = dict(ended.seconds)
     with _clock(seconds, "recover"):
         fields = recover(reduction, solution)
     with _clock(seconds, "readings"):
-        summary = _summary(solved, names)
+        summary = _summary(reduction, solution, names)
+        summary |= {"status": ended.status.label, "message": ended.message}
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
         known = estimate.message if estimate else ""
         summary["remarks"] += [s for s in corner_remarks(reduction, solution) if s not in known]
-    noted = [solution] if solved.path is None else solved.path.solutions
+    noted = [solution] if path is None else path.solutions
     every = [*told, *(text for own in noted for text in own.notes), *summary["remarks"]]
     if solution.solved:  # the states of a path before are kept
-        refuse = solved.path is None
+        refuse = path is None
         every = impossible(summary["limits"], reduction.couplings, refuse) + every
     summary["remarks"] = list(dict.fromkeys(every))
-    if solved.path is not None:
+    if path is not None:
         single = len(reduction.problem.pairs) == 1
         keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
-        summary["states"] = len(solved.path.states)
-        summary |= {key: float(solved.path.history[key][-1]) for key in keys}
+        summary["states"], summary["shown"] = len(path.states), path.shown
+        summary |= {key: float(path.history[key][-1]) for key in keys}
     if estimate is not None:
         summary["accuracy"] = asdict(estimate)
     summary = finite(summary) | {"seconds": seconds}
-    return Result(
-        reduction.scene, reduction, solution, fields, solved.zones, summary, solved.path, estimate
-    )
+    return Result(reduction.scene, reduction, ended, fields, solved.zones, summary, path, estimate)
 
 
-def _summary(solved: Solved, names: tuple[str, str, str]) -> dict[str, Any]:
+def _summary(reduction: Reduction, solution: Solution, names: tuple[str, ...]) -> dict[str, Any]:
     """What is known of the answer on one mesh at one state."""
-    reduction, solution = solved.reduction, solved.solution
     problem, scene = reduction.problem, reduction.scene
     found = tables(reduction, solution)
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))

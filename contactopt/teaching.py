@@ -6,7 +6,10 @@ import base64
 import io
 from collections.abc import Callable, Sequence
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Slider:
@@ -41,7 +44,7 @@ class Slider:
         )
 
 
-def _picture(figure: Any) -> str:
+def _picture(figure: Figure) -> str:
     """The figure as PNG in base64; the figure is closed."""
     import matplotlib.pyplot as plt
 

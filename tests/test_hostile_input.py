@@ -11,7 +11,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -156,7 +156,7 @@ def scenes(rng: np.random.Generator, folder: Path) -> None:
         part = replace(scene.upper, **{any_of(rng, ["supports", "loads"]): (load,)})
         co.reduce(replace(scene, upper=part), elements=1)
     elif kind == "part":
-        field = any_of(rng, list(scene.upper.__dataclass_fields__))
+        field = any_of(rng, [own.name for own in fields(scene.upper)])
         co.reduce(
             replace(scene, upper=replace(scene.upper, **{field: any_of(rng, JUNK)})), elements=1
         )

@@ -10,7 +10,21 @@ import numpy as np
 import pytest
 from conftest import MATERIAL, block
 
-from contactopt import InterfaceProblem, Part, Plate, Rigid, Scene, Solution, Status, Support, run
+from contactopt import (
+    InterfaceProblem,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Solution,
+    Status,
+    Support,
+    Traction,
+    run,
+)
+from contactopt.errors import Unbalanced
+from contactopt.figures.view_page import certificate_words
+from contactopt.outcome import summary_rows, titled
 from contactopt.problem.laws.tied import Tied
 from contactopt.solving import solve_scene
 from contactopt.solving.follow import follow
@@ -72,11 +86,10 @@ def test_the_states_before_one_that_slides_are_written(make, tmp_path, monkeypat
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert all_finite(summary) and summary["states"] == 3 and summary["status"] != "solved"
     assert "state 4 of 4" in summary["message"] and "slides" in summary["message"]
-    if make is fitted:
-        words = "slides, every touching contact slips"
-        assert words in summary["message"] and "in state 3" in summary["message"]
-        said = float(summary["message"].partition("held up to about ")[2].split()[0])
-        assert said == pytest.approx(limit, rel=0.1)
+    words = "slides, every touching contact slips"
+    assert words in summary["message"] and "in state 3" in summary["message"]
+    said = float(summary["message"].partition("held up to about ")[2].split()[0])
+    assert said == pytest.approx(limit, rel=0.1)
     assert not any("so thin" in text for text in summary["remarks"])
     assert len((tmp_path / "history.csv").read_text().splitlines()) == 4
     path = np.load(tmp_path / "path.npz")
@@ -90,6 +103,37 @@ def test_the_states_before_one_that_slides_are_written(make, tmp_path, monkeypat
     np.testing.assert_allclose(
         path["reactions"][-1], again.states[-1].solution.reactions, atol=1e-6 * scale
     )
+
+
+@pytest.mark.parametrize("make", [fitted, dragged])
+def test_what_is_shown_of_a_path_that_ended_early_is_its_last_solved_state(make, monkeypatch):
+    """Its numbers and remarks are those of the path without the state that slides."""
+    scenes = [make(share * most(make)) for share in (0.0, 0.5, 0.9, 1.3)]
+    summary, before = (
+        written(scenes[:count], None, monkeypatch, read=("pressure",)).summary for count in (4, 3)
+    )
+    assert bool(before["remarks"]) == (make is dragged)
+    assert summary["shown"] == "state 3" and before["shown"] is None
+    ended = ("status", "message", "seconds", "shown", "remarks")
+    assert set(before["remarks"]) <= set(summary["remarks"])
+    assert {key: value for key, value in summary.items() if key not in ended} == {
+        key: value for key, value in before.items() if key not in ended
+    }
+    assert titled(summary) == f"{summary['scene']}, state 3, the last one solved"
+    assert summary_rows(summary)["state 3"].startswith("solved: certificate")
+    assert certificate_words(summary).startswith("The path ends after state 3, whose forces are a")
+
+
+def test_a_state_that_tips_over_says_what_the_one_before_held():
+    scenes = []
+    for push in (0.0, 0.1, 2.0):
+        scene = replace(dragged(0.0), mu=5.0)
+        loads = (Traction("top", (push, -1.0)),)
+        scenes.append(replace(scene, upper=replace(scene.upper, loads=loads)))
+    with pytest.raises(Unbalanced) as told:
+        follow(scenes)
+    words = str(told.value)
+    assert "tips over" in words and "in state 2; numbers and files are those of state 2" in words
 
 
 def test_a_state_that_slides_is_given_up_before_the_method_ends(monkeypatch):

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from contactopt.readings.corners import infinite
 from contactopt.readings.quantities import Quantity, elastic_energy, find_quantity
 from contactopt.readings.state import State
 from contactopt.solving.solve_scene import Solved
+
+if TYPE_CHECKING:
+    from contactopt.scenes.scene import Part
 
 log = logging.getLogger(__name__)
 ENERGY = "energy"
@@ -133,7 +136,13 @@ def element_errors(
 
 
 def _of_shape(
-    part: Any, dim: int, body: Body, volume: np.ndarray, U: np.ndarray, W: np.ndarray, curved: float
+    part: Part,
+    dim: int,
+    body: Body,
+    volume: np.ndarray,
+    U: np.ndarray,
+    W: np.ndarray,
+    curved: float,
 ) -> np.ndarray:
     """What volumes (elements,) between facets and their curves add to the error."""
     if not np.any(volume):
@@ -153,15 +162,14 @@ def read_once(solved: Solved, name: str) -> dict[str, Any]:
     state.
     """
     quantity = find_quantity(name, solved.reduction.scene)
-    reading = read(quantity, solved)
-    size = np.inf
+    size, last = np.inf, solved if solved.path is None else _state(solved, -1)
+    reading = read(quantity, replace(solved, solution=last.solution))
     elastic = [part for part in solved.reduction.scene.parts if part.elastic]
     if all(part.meshed for part in elastic):
-        last = solved if solved.path is None else _state(solved, -1)
         errors = element_errors(last, quantity, reading.value)
         size = np.inf if errors.unsigned else errors.size
     size += reading.uncertainty
-    message = reading.missing or infinite(solved.reduction, solved.solution, reading)
+    message = reading.missing or infinite(last.reduction, last.solution, reading)
     known = np.isfinite(size) and reading.value != 0 and not message
     error = size / abs(reading.value) if known else None
     return {"value": reading.value, "error": error} | ({"message": message} if message else {})

@@ -105,7 +105,7 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
     space contactopt.meshes.facet_surfaces), as it is solved.
     """
 
-    def moved(part: Part) -> Any:
+    def moved(part: Any) -> Any:
         points, curves = part.mesh.p.copy(), dict[str, Any](shapes.of(part))
         for name, other in shapes.guessed.get(part.name, {}).items():
             if other is None:
@@ -183,7 +183,7 @@ def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, 
     return tuple(np.array(sorted(elements), dtype=int) for elements in chosen)
 
 
-def _facets(part: Part, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _facets(part: Any, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middles (dim, f) and sizes (f,) of the facets of a boundary [length], and their elements."""
     mesh = straight(part.mesh)
     facets = mesh.boundaries[name]

@@ -81,7 +81,7 @@ def _blamed(message: str, entry: Mapping[str, Any], kind: str) -> str:
     return min(places, key=places.__getitem__, default=kind)
 
 
-def size_of(value: Any) -> int:
+def size_of(value: object) -> int:
     """How many values a list or a range stands for, without making them."""
     if isinstance(value, dict):
         steps = value.get("steps")
@@ -89,7 +89,7 @@ def size_of(value: Any) -> int:
     return len(value) if isinstance(value, list) else 1
 
 
-def _values_of(name: str, value: Any) -> list[Any]:
+def _values_of(name: str, value: object) -> list[Any]:
     """One value, a list of them, or a range {from, to, steps, scale = "linear" or "log"}."""
     if isinstance(value, dict):
         return _range_of(name, value)

@@ -91,7 +91,7 @@ class Registry:
         return self.methods.get(name)
 
 
-def source_of(declared: Any) -> str:
+def source_of(declared: Callable[..., Any]) -> str:
     """Digest of the file that declares a function or class, "" where there is no such file."""
     try:
         path = inspect.getsourcefile(declared)
@@ -101,7 +101,9 @@ def source_of(declared: Any) -> str:
     return hashlib.sha256(Path(str(path)).read_bytes()).hexdigest()[:16] if found else ""
 
 
-def method(make: Any = None, *, name: str | None = None, peer: Peer | None = None) -> Any:
+def method(
+    make: Callable[..., Any] | None = None, *, name: str | None = None, peer: Peer | None = None
+) -> Any:
     """Declare a function or class as a method of the benchmark.
 
     The declaration counts where a campaign runs the file. Everywhere else the function or class is
@@ -128,7 +130,7 @@ def method(make: Any = None, *, name: str | None = None, peer: Peer | None = Non
     InputError : For the name of a method of contactopt.
     """
 
-    def register(make: Any) -> Any:
+    def register(make: Callable[..., Any]) -> Callable[..., Any]:
         plugin = Plugin(_name("method", make, name), make, peer)
         if plugin.name in METHODS:
             raise InputError(
@@ -139,7 +141,7 @@ def method(make: Any = None, *, name: str | None = None, peer: Peer | None = Non
     return register if make is None else register(make)
 
 
-def problem(make: Any = None, *, name: str | None = None) -> Any:
+def problem(make: Callable[..., Any] | None = None, *, name: str | None = None) -> Any:
     """Declare a function of named parameters that returns an InterfaceProblem, for `family = NAME`
     in an experiment file.
 
@@ -157,19 +159,19 @@ def problem(make: Any = None, *, name: str | None = None) -> Any:
     InputError : For a name that cannot be used.
     """
 
-    def register(make: Any) -> Any:
+    def register(make: Callable[..., Any]) -> Callable[..., Any]:
         return _marked(make, "problems", _name("problem", make, name), make)
 
     return register if make is None else register(make)
 
 
-def _marked(make: Any, *declared: Any) -> Any:
+def _marked(make: Callable[..., Any], *declared: object) -> Callable[..., Any]:
     """The function or class with a note for the registry that runs its file."""
     setattr(make, MARK, (*getattr(make, "__dict__", {}).get(MARK, ()), declared))
     return make
 
 
-def _name(kind: str, make: Any, name: object) -> str:
+def _name(kind: str, make: object, name: object) -> str:
     """The name under which `make` is registered, if both are of the right kind."""
     if not callable(make):
         raise InputError(

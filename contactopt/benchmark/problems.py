@@ -98,7 +98,7 @@ class ProblemSpec:
         return problem
 
 
-def short_number(value: Any) -> str:
+def short_number(value: object) -> str:
     """A float in the fewest characters that give it back, and anything else as text."""
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 

@@ -31,6 +31,9 @@ from contactopt.figures.style import (
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.colors import Normalize
+    from matplotlib.image import AxesImage
 
 ACCURACIES = 1e-2, 1e-11, 10  # certificates of `time_to_accuracy`: first, last, how many
 # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
@@ -278,7 +281,7 @@ def _grid(rows: pd.DataFrame, x: str, y: str, value: str) -> pd.DataFrame:
     )
 
 
-def _draw_map(ax: Axes, grid: pd.DataFrame, norm: Any, beside: bool) -> Any:
+def _draw_map(ax: Axes, grid: pd.DataFrame, norm: Normalize, beside: bool) -> AxesImage:
     """Draw one map, with less room if another stands beside it; its picture."""
     ax.set_facecolor("#cccccc")
     ax.patch.set(hatch="xx", edgecolor="#999999")
@@ -351,7 +354,7 @@ def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
     return " ".join(words)
 
 
-def write_numbers(ax: Axes, grid: pd.DataFrame, norm: Any, size: float) -> None:
+def write_numbers(ax: Axes, grid: pd.DataFrame, norm: Normalize, size: float) -> None:
     """Write the numbers of a map in its cells, black on light colours and white on dark ones."""
     values = grid.to_numpy(float)
     if values.size > CELLS:
@@ -363,7 +366,7 @@ def write_numbers(ax: Axes, grid: pd.DataFrame, norm: Any, size: float) -> None:
             ax.text(column, row, text, ha="center", va="center", fontsize=size, color=colour)
 
 
-def set_ticks(axis: Any) -> None:
+def set_ticks(axis: Axis) -> None:
     """Put ticks at 1, 2, 5 on a logarithmic axis of less than two decades."""
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 

@@ -210,7 +210,7 @@ def _absent(rows: pd.DataFrame) -> list[tuple[str, str]]:
     return list(dict.fromkeys(zip(left["method"], left["message"])))
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: float | str | bool | None) -> float | str | bool | None:
     """A value that JSON can hold: numbers with four digits, None where there is none."""
     if isinstance(value, str | bool | np.bool_) or value is None:
         return bool(value) if isinstance(value, np.bool_) else value

@@ -29,6 +29,7 @@ from contactopt.screen import progress
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 # of a figure; all others are arguments of its function
 OWN_KEYS = ("kind", "caption", "where", "optional")
@@ -192,7 +193,7 @@ def _foot(layout: Experiment, folder: Path, table: pd.DataFrame) -> str:
 def _markdown(table: pd.DataFrame) -> str:
     """A table in Markdown; numbers with three significant digits."""
 
-    def text(value: Any) -> str:
+    def text(value: object) -> str:
         if isinstance(value, float):
             return f"{value:.3g}"
         return _one_line(value).replace("|", "\\|")
@@ -206,7 +207,7 @@ def _one_line(text: object) -> str:
     return " ".join(str(text).split())
 
 
-def _png(figure: Any) -> bytes:
+def _png(figure: Figure) -> bytes:
     """With at most SHADES colours: a third of the size."""
     from PIL import Image
 

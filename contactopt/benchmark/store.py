@@ -137,7 +137,7 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
                 yield row
 
 
-def _wrong(row: Any) -> str:
+def _wrong(row: object) -> str:
     """What makes a row none of a campaign, "" for nothing."""
     if not isinstance(row, dict):
         return "this is no row"
@@ -154,7 +154,7 @@ def _wrong(row: Any) -> str:
     return ""
 
 
-def _is(value: Any, kind: str) -> bool:
+def _is(value: object, kind: str) -> bool:
     """Whether a value is of the kind of a column."""
     kinds = {"int": int, "str": str, "float": int | float, "bool": bool}
     return isinstance(value, kinds[kind]) and (kind == "bool" or not isinstance(value, bool))

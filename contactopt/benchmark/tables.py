@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 INSTANCE = ["problem", "setting"]
 
 
-def select(table: pd.DataFrame, **where: Any) -> pd.DataFrame:
+def select(table: pd.DataFrame, **where: object) -> pd.DataFrame:
     """The rows whose columns have the values `where`, one, a list or '' for none; InputError on an
     unknown column, or if no row is left.
     """

@@ -252,7 +252,7 @@ def _call(task: Task) -> Call:
     return read
 
 
-def _read(answer: Any, label: str) -> Answer:
+def _read(answer: object, label: str) -> Answer:
     """What a plug-in's function returned, in whatever form."""
     if isinstance(answer, Answer):
         return replace(answer, label=label)
@@ -291,7 +291,7 @@ def _in_form(answer: Answer, problem: InterfaceProblem | States, seconds: float)
     )
 
 
-def _real(values: Any) -> np.ndarray:
+def _real(values: object) -> np.ndarray:
     """An array of floats of its own; TypeError or ValueError if the values are not real numbers."""
     array = np.asarray(values)
     if np.iscomplexobj(array):

@@ -6,11 +6,10 @@ A new kind of body is one module and one line of the table BODIES.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
 
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.errors import InputError
-from contactopt.scenes.matrix_part import MatrixPart
+from contactopt.scenes.matrix_part import AnyPart, MatrixPart
 from contactopt.scenes.scene import HalfSpace, Part, Rigid, Scene
 
 # class of the part of a scene -> (module, function (scene, part, elements, zone) -> AssembledBody,
@@ -32,7 +31,7 @@ BODIES: dict[type, tuple[str, str, str]] = {
 }
 
 
-def assemble(scene: Scene, part: Any, elements: int, zone: float | None) -> AssembledBody:
+def assemble(scene: Scene, part: AnyPart, elements: int, zone: float | None) -> AssembledBody:
     """The body that models one part of a scene, with `elements` across the half-width `zone`
     [length] of the contact; its linear system is not solved yet. InputError for a part that no kind
     of body models.

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +16,7 @@ from contactopt.errors import InputError
 
 if TYPE_CHECKING:
     from contactopt.problem.chart import Chart
+    from contactopt.scenes.body_kinds import HalfSpace, Rigid
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +211,7 @@ class UndividedBody(AssembledBody, Body):
     fields  (n, p) displacements of its free motions
     """
 
-    part: Any
+    part: Rigid | HalfSpace
     components: tuple[str, ...]
     whole: range
     if TYPE_CHECKING:

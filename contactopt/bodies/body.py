@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import skfem
@@ -39,6 +39,10 @@ from contactopt.problem.laws import find_law
 from contactopt.scenes.loads import Load
 from contactopt.scenes.loads.load import Face
 from contactopt.scenes.scene import Part, Scene
+
+if TYPE_CHECKING:
+    from contactopt.scenes.body_kinds import Part
+    from contactopt.scenes.matrix_part import MatrixPart
 
 CLOSED = 1e-3  # of the area of a face: the length of the integral of its normals that is none
 FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
@@ -295,7 +299,7 @@ class Constraints:
     """
 
     scene: Scene
-    part: Any
+    part: Part | MatrixPart
     numbers: np.ndarray
     known: Mapping[str, Any]
     nodes: Callable[[str], np.ndarray]

@@ -22,7 +22,6 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -145,7 +144,7 @@ class ElasticBody(Body):
         return BodyTerm(T[:, self.kept], *self.solver.iteration, entries, low_rank)
 
     def displacement(
-        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+        self, force: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None = None
     ) -> np.ndarray:
         """U of all unknowns, eq (13) of the paper."""
         if free is not None:

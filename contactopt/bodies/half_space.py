@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -175,7 +174,7 @@ class HalfSpaceBody(UndividedBody):
         return np.asarray((made + made.T) / 2)
 
     def displacement(
-        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+        self, force: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None = None
     ) -> np.ndarray:
         return np.asarray(
             self.at_rest + self.fields @ multipliers + self._compliance_product(force)

@@ -13,8 +13,8 @@ lambda (p,) it moves by
 where C (n, n) is its compliance: symmetric, positive semidefinite and never formed. The resultants
 (p,) are the work of the loads in each free motion, which the contact forces have to balance.
 
-Stresses, errors of elements, resultants of supports and derivatives by loads are functions of a
-`view` of its matrices and of its mesh (contactopt.bodies.views).
+Stresses, errors of elements, resultants of supports and derivatives with respect to loads are
+functions of a `view` of its matrices and of its mesh (contactopt.bodies.views).
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from contactopt.linear.convolution import Kernel
     from contactopt.linear.operators import Product
     from contactopt.linear.saddle_point import BodyTerm
+    from contactopt.scenes.scene import Scene
 
 
 class FreeMotions(NamedTuple):
@@ -81,7 +82,7 @@ class Seen:
 
 
 class Body(ABC):
-    """A body that moves under contact forces, as in the head of this module.
+    """A body that moves under contact forces, as at the top of this module.
 
     name      its name in the scene
     unknowns  number of its free displacement unknowns, for tables
@@ -111,7 +112,7 @@ class Body(ABC):
 
     @abstractmethod
     def displacement(
-        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+        self, force: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None = None
     ) -> np.ndarray:
         """The displacement U (n,) [length] under contact forces (n,) [force] and multipliers (p,)
         of the free motions [length].
@@ -128,7 +129,7 @@ class Body(ABC):
         """
 
     @abstractmethod
-    def loaded(self, scene: Any, part: Any) -> Body:
+    def loaded(self, scene: Scene, part: Any) -> Body:
         """The same body under the loads of another scene, whose part stands for it; InputError if
         more than load values differ.
         """

@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -134,7 +133,7 @@ class RigidBody(UndividedBody):
         return Seen(lambda X, _: np.zeros(X.shape), lambda: np.zeros((rows, rows)), still)
 
     def displacement(
-        self, force: np.ndarray, multipliers: np.ndarray, free: Any = None
+        self, force: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None = None
     ) -> np.ndarray:
         follows = np.roll(force, len(self.components))
         return np.asarray(self.at_rest + self.fields @ multipliers + follows)

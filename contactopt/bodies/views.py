@@ -6,7 +6,7 @@ which the matrices are known and the elements are not has no stress either.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from contactopt.bodies.assembly import Assembly, Matrices
 from contactopt.bodies.fields import Fields, Region, Validity
 from contactopt.bodies.protocol import Body
 from contactopt.bodies.stress_recovery import StressMap
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
+    from contactopt.scenes.scene import Scene
 
 
 def elements_of(body: Body) -> Assembly | None:
@@ -136,7 +140,7 @@ def stress_map(body: Body, region: Region, by_poisson: bool = False) -> StressMa
 
 
 def load_work(
-    body: Body, scene: Any, part: Any, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
+    body: Body, scene: Scene, part: AnyPart, dual: np.ndarray, weights: np.ndarray, W: np.ndarray
 ) -> float:
     """What the loads of another scene change in `at_rest` and in the resultants, times the weights
     `dual` (n,) and `weights` (p,), without a solve where the matrices are known; W as in

@@ -6,7 +6,7 @@ contactopt.coupling.segments cuts.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -81,7 +81,7 @@ class FacingFacets:
         names = [part.name for part in scene.parts]
         self.sides: list[_Side] = []
         self.rigid: list[tuple[int, float]] = []
-        self.shape: Any = None
+        self.shape: Callable[[np.ndarray], np.ndarray] | None = None
         for body, surface, sign in zip(pair.bodies, pair.surfaces, (1.0, -1.0)):
             place = names.index(body)
             part, own = scene.parts[place], cells[place]

@@ -33,13 +33,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bounds.vertex_balance import Balance
 from contactopt.material import Material, lame
+
+if TYPE_CHECKING:
+    from contactopt.bounds.tetrahedra import Tetrahedra
+
 
 GAIN = 0.05  # of the energy: a step that makes it less by a smaller share is the last one
 STEPS = 30  # at most
@@ -69,7 +73,7 @@ class Energy(NamedTuple):
 class BalancedMoments:
     """The map P of the head of this module, and its transpose, for the elements of a body."""
 
-    cells: Any
+    cells: Tetrahedra
     material: Material
     balance: Balance
     answer: Answer

@@ -5,7 +5,7 @@ allows and that balance the bodies, and displacements that the contact allows.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,6 +28,9 @@ from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved
 from contactopt.solving.solve_scene import Solved
+
+if TYPE_CHECKING:
+    from contactopt.bodies.protocol import Body
 
 THIN = 3e4  # length over height: half as much again is past what rounding permits
 CLEAR = 1.5  # of the bubbles that a facet beside the pressure needs, so that it stays open
@@ -82,7 +85,7 @@ class PressedScene:
             if pair.joined and np.any(self.tractions[pair.alone, 0] > 0):
                 raise InputError("a surface is pressed beyond the end of the other: no bound.")
 
-    def _elements(self, number: int, body: Any) -> Simplices | None:
+    def _elements(self, number: int, body: Body) -> Simplices | None:
         """The elements of an elastic body, None for a rigid one."""
         if isinstance(body, RigidBody):
             return None

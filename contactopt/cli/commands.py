@@ -9,13 +9,16 @@ import tomllib
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contactopt.cards import count
 from contactopt.checks import overheard
 from contactopt.errors import InputError
 from contactopt.files.toml_table import parse
 from contactopt.screen import progress
+
+if TYPE_CHECKING:
+    from contactopt.runner import Result
 
 
 def _arguments_of(texts: list[str]) -> dict[str, Any]:
@@ -64,13 +67,13 @@ def run(options: argparse.Namespace) -> int:
     return 0 if result.solution.solved and reached else 1
 
 
-def _print_result(result: Any, out: str) -> None:
+def _print_result(result: Result, out: str) -> None:
     from contactopt.figures.output import SINGLE
-    from contactopt.outcome import pair_rows, remark_rows, summary_rows, time_words
+    from contactopt.outcome import pair_rows, remark_rows, summary_rows, time_words, titled
     from contactopt.screen import in_tables
 
     s = result.summary
-    print(in_tables(s["scene"], pair_rows(s), summary_rows(s) | remark_rows(s)))
+    print(in_tables(titled(s), pair_rows(s), summary_rows(s) | remark_rows(s)))
     if (estimate := result.estimate) is not None:
         if estimate.guarantee is not None:
             print(estimate.guarantee.sentence)
@@ -122,7 +125,9 @@ def mesh(options: argparse.Namespace) -> int:
         fine = dict(options.fine)
         names = {new: old.split(",") for new, old in options.name}
         mesh_part(part, path, options.size, fine, names, options.order)
-    meshes, refused = load_bodies(path)
+    with overheard() as told:
+        meshes, refused = load_bodies(path)
+    refused += told
     text, named = mesh_words(path, meshes)
     print("\n".join([text, *(f"# note: {note}" for note in refused)]))
     if options.no_page or not meshes:

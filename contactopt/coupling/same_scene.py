@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from types import FunctionType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from skfem import Mesh
 
 
 def check_same(one: Scene, other: Scene) -> None:
@@ -35,7 +39,7 @@ def check_same(one: Scene, other: Scene) -> None:
                 )
 
 
-def _same_mesh(one: Any, other: Any) -> bool:
+def _same_mesh(one: Mesh | Callable[..., Mesh], other: Mesh | Callable[..., Mesh]) -> bool:
     """Whether two meshes, or what the functions that make them enclose, are the same."""
     if callable(one) or callable(other):
         return callable(one) and callable(other) and not _differ(one, other)

@@ -1,10 +1,10 @@
-"""The gradient of a quantity of a solved scene by the parameters of the scene."""
+"""The gradient of a quantity of a solved scene with respect to the parameters of the scene."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contactopt.derivatives.kinks import Weak, of_kinks
 from contactopt.derivatives.states import Chain, along, chain_of
@@ -12,6 +12,10 @@ from contactopt.errors import InputError
 from contactopt.readings.quantities import seeds_of
 from contactopt.readings.state import Seeds
 from contactopt.scenes.parameters import parameters as parameters_of
+
+if TYPE_CHECKING:
+    from contactopt.runner import Result
+    from contactopt.solving.paths import PathResult
 
 GROUND = (
     "; a soft ground holds a thin body, whose pull is taken as constant, so that the derivatives"
@@ -55,8 +59,8 @@ class Gradient:
 
 
 def gradient(
-    result: Any,
-    quantity: Any,
+    result: Result | PathResult,
+    quantity: object,
     parameters: str | Sequence[str],
     state: int = -1,
     distance: float | None = None,

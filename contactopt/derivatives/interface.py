@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +24,10 @@ from contactopt.problem import (
 from contactopt.problem.certificate import Moved
 from contactopt.problem.scaling import immovable, scales_of, without_rounding
 
+if TYPE_CHECKING:
+    from scipy.sparse import spmatrix
+    from scipy.sparse.linalg import LinearOperator
+
 CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
 NEAR = 1e-6  # distance to a kink, over the largest force, within which a contact is weakly active
 ROUNDING = 100  # and this many times the certificate, if that is more
@@ -40,8 +44,8 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Dual:
-    """The gradient of a function of the solution by the data of the problem, in the unit of the
-    function over theirs.
+    """The gradient of a function of the solution with respect to the data of the problem,
+    in the unit of the function over theirs.
 
     q   (k, dim);  mu  (k,) by the law's parameter at each contact;  s  (p,)
     reactions, multipliers  of the solution, with which df = sum (q r') * dQ + sum V * dV
@@ -57,7 +61,7 @@ class Dual:
     def mu(self) -> np.ndarray:
         return self.by_parameter()
 
-    def along_Q(self, change: Any) -> float:
+    def along_Q(self, change: spmatrix | LinearOperator | np.ndarray) -> float:
         """df for a change of Q: an array, a sparse matrix, or an operator with products."""
         return float(self.q.ravel() @ np.asarray(change @ self.reactions.ravel()))
 
@@ -152,7 +156,7 @@ class Sensitivity:
         q: ArrayLike | None = None,
         mu: ArrayLike | None = None,
         s: ArrayLike | None = None,
-        Q: Any = None,
+        Q: spmatrix | LinearOperator | np.ndarray | None = None,
         V: ArrayLike | None = None,
     ) -> Change:
         """The change of the solution along a direction of q (k, dim), mu (k,) or a number, s (p,),
@@ -201,10 +205,10 @@ class Sensitivity:
         multipliers: ArrayLike | None = None,
         displacements: ArrayLike | None = None,
     ) -> Dual:
-        """The gradient by all data of f(r, lambda, u) with the derivatives `reactions` (k, dim),
-        `multipliers` (p,) and `displacements` (k, dim), from one transposed solve. Where contacts
-        are weakly active it is that of the piece at which the solver ended. InputError as
-        forward().
+        """The gradient with respect to all data of f(r, lambda, u) with the derivatives `reactions`
+        (k, dim), `multipliers` (p,) and `displacements` (k, dim), from one transposed solve.
+        Where contacts are weakly active it is that of the piece at which the solver ended.
+        InputError as forward().
         """
         problem = self.problem
         by_r = _given("reactions", reactions, problem.q.shape)
@@ -235,8 +239,8 @@ class Sensitivity:
 def sensitivity(
     problem: InterfaceProblem, solution: Solution, distance: float | None = None
 ) -> Sensitivity:
-    """The derivative of a certified solution by the data of its problem, as an operator with
-    products forward and adjoint.
+    """The derivative of a certified solution with respect to the data of its problem, as an
+    operator with products forward and adjoint.
 
     Nothing is solved before it is asked for; the factors are then kept and serve all directions.
 
@@ -299,7 +303,9 @@ def _given(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> np.nda
     return np.broadcast_to(array, shape) if array.ndim == 0 else _shaped(name, array, shape)
 
 
-def _shaped(name: str, value: Any, shape: tuple[int, ...]) -> Any:
+def _shaped(
+    name: str, value: spmatrix | LinearOperator | np.ndarray, shape: tuple[int, ...]
+) -> spmatrix | LinearOperator | np.ndarray:
     if getattr(value, "shape", None) != shape:
         raise InputError(
             f"{name} must have the shape {shape}; got"

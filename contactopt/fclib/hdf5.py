@@ -7,7 +7,7 @@ H' M^-1 f + w. Format: FCLib 1.x.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +19,9 @@ from contactopt.fclib.text import compact
 from contactopt.files.writing import whole_file
 from contactopt.linear.operators import has_entries
 from contactopt.problem import InterfaceProblem
+
+if TYPE_CHECKING:
+    import h5py
 
 MAGIC = b"\x89HDF\r\n\x1a\n"  # the first bytes of an HDF5 file
 # bytes that need not be in the file, and how much smaller compression can make others
@@ -50,7 +53,7 @@ def read_hdf5(path: Path) -> InterfaceProblem:
         raise InputError("it holds neither 'fclib_local' nor 'fclib_global'")
 
 
-def _item(group: Any, name: str) -> Any:
+def _item(group: h5py.Group, name: str) -> Any:
     """The group or data set of that path; InputError if it lies in another file or is larger than
     what is stored of it.
     """
@@ -67,7 +70,7 @@ def _item(group: Any, name: str) -> Any:
     return group
 
 
-def _array(group: Any, name: str) -> np.ndarray:
+def _array(group: h5py.Group, name: str) -> np.ndarray:
     return np.ravel(_item(group, name)[()])
 
 
@@ -115,7 +118,7 @@ def write(
             group["vectors/s"] = problem.s
 
 
-def _read_local(group: Any) -> InterfaceProblem:
+def _read_local(group: h5py.Group) -> InterfaceProblem:
     _, q, mu = _vectors(group, "q")
     W = compact(_read_matrix(_item(group, "W"), (q.size, q.size)))
     if "V" in group and "R" in group:
@@ -127,7 +130,7 @@ def _read_local(group: Any) -> InterfaceProblem:
     return InterfaceProblem(W, q, mu)
 
 
-def _read_global(group: Any) -> InterfaceProblem:
+def _read_global(group: h5py.Group) -> InterfaceProblem:
     dim, w, mu = _vectors(group, "w")
     f = _array(group, "vectors/f").astype(float)
     M = _read_matrix(_item(group, "M"), (len(f), len(f)))
@@ -161,14 +164,14 @@ def _solved(M: sp.csr_array, X: sp.csr_array) -> sp.csr_array:
     return sp.csr_array(sp.hstack(parts))
 
 
-def _vectors(group: Any, name: str) -> tuple[int, np.ndarray, np.ndarray]:
+def _vectors(group: h5py.Group, name: str) -> tuple[int, np.ndarray, np.ndarray]:
     dim = int(_array(group, "spacedim")[0])
     if dim not in (2, 3):
         raise InputError(f"spacedim is {dim}, not 2 or 3")
     return dim, _array(group, f"vectors/{name}").reshape(-1, dim), _array(group, "vectors/mu")
 
 
-def _read_matrix(group: Any, shape: tuple[int, int]) -> sp.csr_array:
+def _read_matrix(group: h5py.Group, shape: tuple[int, int]) -> sp.csr_array:
     """nz = -2: compressed rows, -1: compressed columns, >= 0: triplets (p columns, i rows)."""
     m, n, nz = (int(_array(group, key)[0]) for key in ("m", "n", "nz"))
     if (m, n) != shape:
@@ -186,7 +189,7 @@ def _read_matrix(group: Any, shape: tuple[int, int]) -> sp.csr_array:
     return sp.csr_array(matrix)
 
 
-def _write_matrix(group: Any, matrix: sp.csc_matrix) -> None:
+def _write_matrix(group: h5py.Group, matrix: sp.csc_matrix) -> None:
     m, n = matrix.shape
     for key, value in {"m": m, "n": n, "nz": -1, "nzmax": matrix.nnz}.items():
         group[key] = np.array([value], dtype=np.int32)

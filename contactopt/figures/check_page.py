@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem import Mesh
@@ -26,6 +26,10 @@ from contactopt.meshes.cells import elements_of, facet_nodes
 from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.scene import Part, Scene, Support
+
+if TYPE_CHECKING:
+    from contactopt.coupling.coupling import Coupling
+    from contactopt.scenes.contact import Contact
 
 ROLES = ("no use", "support", "load", "plate", "bolt", "contact")
 NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundary that stay legible
@@ -174,7 +178,7 @@ def _spatial(points: np.ndarray) -> np.ndarray:
     return np.pad(points, ((0, 3 - len(points)), (0, 0))).T
 
 
-def _pair(pair: Any, made: Any, many: int) -> dict[str, Any]:
+def _pair(pair: Contact, made: Coupling, many: int) -> dict[str, Any]:
     """The contacts of a pair with their gaps and normals."""
     return {
         "name": pair.name,

@@ -16,11 +16,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactopt.files.writing import whole_file
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
@@ -30,7 +33,7 @@ KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4",
 SHORT = 65535  # the largest number of two bytes
 
 
-def packed(array: Any) -> dict[str, Any]:
+def packed(array: ArrayLike) -> dict[str, Any]:
     """Numbers or truth values for the data of a page, of four bytes each."""
     array = np.asarray(array)
     name, kind = KINDS[array.dtype.kind]

@@ -15,7 +15,7 @@ import numpy as np
 from contactopt.cards import card
 from contactopt.errors import InputError
 from contactopt.figures.output import not_drawable
-from contactopt.outcome import Outcome, pair_rows, remark_rows, summary_rows
+from contactopt.outcome import Outcome, pair_rows, remark_rows, summary_rows, titled
 from contactopt.problem import alone
 from contactopt.scenes.scene import Scene
 
@@ -26,7 +26,8 @@ DOTS = 120  # per inch of a picture
 def result_card(result: Outcome) -> str:
     """The tables of a result, its remarks and its largest pressure, as HTML."""
     s = result.summary
-    rows, title = summary_rows(s) | remark_rows(s), f"{result.scene.name}, {result.scene.friction}"
+    rows, title = summary_rows(s) | remark_rows(s), titled(s | {"scene": result.scene.name})
+    title += f", {result.scene.friction}"
     return card(title, rows, pair_rows(s)) + _pressure(result)
 
 
@@ -43,7 +44,7 @@ def _pressure(result: Outcome) -> str:
     problem = result.problem
     largest = [result.pressure[pair.contacts].max(initial=0.0) for pair in problem.pairs]
     pair = problem.pairs[int(np.argmax(largest))]
-    figure = pressure(result.scene, *alone(problem, result.solution, pair)).figure
+    figure = pressure(result.scene, *alone(problem, result.shown, pair)).figure
     figure.dpi, file = DOTS, io.BytesIO()
     FigureCanvasAgg(figure).print_png(file)
     name = html.escape(f"pressure of {pair.name}")

@@ -28,6 +28,8 @@ from contactopt.solving.restart import FILE
 from contactopt.solving.solve_scene import Solved
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from contactopt.coupling.back_to_bodies import Fields
 
 PAGE = "view.html"
@@ -54,17 +56,17 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
     """Draw bodies, the surfaces of every pair, maps and load path into files of every format."""
     from contactopt.figures import plots
 
-    def save(figure: Any, name: str) -> None:
+    def save(figure: Figure, name: str) -> None:
         for ending in formats:
             save_figure(figure, folder / f"{name}.{ending}")
 
-    problem, solution = result.problem, result.solution
+    problem, solution = result.problem, result.shown
     if result.fields:
         first, couplings = part_of(problem, problem.pairs[0]), result.reduction.couplings
         picture = plots.deformed(result.scene, first, result.fields, couplings=couplings)
         save(picture.figure, "deformed")
     if any(isinstance(part, HalfSpace) for part in result.scene.parts):
-        save(plots.maps_figure(result.reduction, result.solution), "maps")
+        save(plots.maps_figure(result.reduction, result.shown), "maps")
     for pair in problem.pairs:
         name = "pressure" if len(problem.pairs) == 1 else f"pressure-{pair.name}"
         save(plots.contact_figure(result.scene, *alone(problem, solution, pair)), name)
@@ -78,17 +80,17 @@ def write(result: Outcome, folder: Path) -> None:
     """Write the fields of a result as VTU files, its contacts and states as tables, and its contact
     forces and load path as arrays, into a folder.
     """
-    surfaces = contact_fields(result.reduction, result.solution)
+    surfaces = contact_fields(result.reduction, result.shown)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
-    displaced = result.reduction.displaced(result.solution)
+    displaced = result.reduction.displaced(result.shown)
     for body, B, U in zip(result.reduction.bodies, result.reduction.maps, displaced):
         if isinstance(body.view, GivenMatrices):
-            force = B.T @ result.solution.reactions.ravel()
+            force = B.T @ result.shown.reactions.ravel()
             body.view.write_vtu(folder / f"{body.name}.vtu", U, force)
     for surface in surfaces:
         surface.write_vtu(folder / f"contact-{surface.name}.vtu")
-    problem, r = result.problem, result.solution.reactions
+    problem, r = result.problem, result.shown.reactions
     places = np.concatenate([pair.chart.places for pair in problem.pairs], axis=1)
     x = places.T if problem.dim == 3 else places[0]
     status, bound = contact_status(problem, r), problem.law.bound_along(r)
@@ -107,7 +109,7 @@ def write(result: Outcome, folder: Path) -> None:
     )
     path = result.path
     if path is None:
-        only = state_of(Solved(result.reduction, result.solution))[0]
+        only = state_of(Solved(result.reduction, result.shown))[0]
         PathResult((only,), result.reduction).write_history(folder / "history.csv")
     else:
         path.write(folder)
@@ -117,7 +119,7 @@ def write(result: Outcome, folder: Path) -> None:
 
 def not_drawable(result: Outcome) -> str:
     """Why nobody can draw an answer, one sentence; empty where a figure can show it."""
-    still = result.solution.solved or all(
+    still = result.shown.solved or all(
         bool(np.abs(own.displacement).max(initial=0.0) <= FAR * np.ptp(own.mesh.p))
         for own in result.fields
     )

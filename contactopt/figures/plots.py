@@ -285,7 +285,7 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
     ]
     if problem.law.rough.any():
         traction, slip = (np.linalg.norm(maps[name], axis=-1) for name in ("traction", "slip"))
-        two: Any = ListedColormap([BLUE, ORANGE])
+        two = ListedColormap([BLUE, ORANGE])
         panels += [
             ("traction", closed, traction, f"tangential traction [{stress}]", "viridis"),
             ("slip", closed, slip, f"slip [{length}]", "cividis"),

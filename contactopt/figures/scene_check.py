@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -32,6 +32,9 @@ from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 from contactopt.solving.solve_scene import STEPS
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 CLOSED = 1e-9  # of the size of a surface, within which a gap is what rounding leaves of zero
 FLAT = 0.01  # degrees by which normals may differ and still be one direction
@@ -140,7 +143,7 @@ def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
     )
 
 
-def _held(part: Any, name: str, free: InterfaceProblem) -> str:
+def _held(part: AnyPart, name: str, free: InterfaceProblem) -> str:
     """What holds a body."""
     start = f"body '{name}': "
     names = [name.removeprefix(start) for name in free.motions if name.startswith(start)]

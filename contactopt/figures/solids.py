@@ -8,12 +8,13 @@ small ones.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
 
 LINE = 0.7  # half of the width of a mesh line [pixels]
 SPARSE = 6.0  # pixels, the least height of a triangle beside whose edges mesh lines are drawn
@@ -34,7 +35,7 @@ def seen_from(elevation: float, azimuth: float) -> np.ndarray:
 
 
 def picture(
-    corners: np.ndarray, values: np.ndarray, lined: np.ndarray, colours: Any, pixels: int
+    corners: np.ndarray, values: np.ndarray, lined: np.ndarray, colours: ScalarMappable, pixels: int
 ) -> tuple[np.ndarray, tuple[float, float, float, float]]:
     """Triangles (m, 3, 3), as they are seen, as an image (h, w, 4), its first row below, and its
     extent. `values` (m, 3) at the corners get `colours`; edges opposite to a corner that are

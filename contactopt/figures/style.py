@@ -14,6 +14,9 @@ import numpy as np
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.figure import Figure
 
 # of Okabe and Ito, legible to all; in place of their yellow, too light for a line, Tol's wine
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#882255")
@@ -122,7 +125,7 @@ def add_legend(ax: Axes) -> None:
     ax.legend(fontsize=letters, labelspacing=0.2, **look, **where)
 
 
-def add_colours(drawn: Any, ax: Axes, label: str, **room: Any) -> Any:
+def add_colours(drawn: ScalarMappable, ax: Axes, label: str, **room: object) -> Colorbar:
     """The colour bar of what was drawn on axes, or on several."""
     first = np.ravel(ax)[0]
     bar = first.figure.colorbar(drawn, ax=ax, label=label, **({"shrink": 0.8} | room))
@@ -179,7 +182,7 @@ def draw_lines(
     label_ends(ax, ends)
 
 
-def save_figure(figure: Any, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure to a file. A PNG is drawn once; Figure.savefig would draw it twice."""
     import matplotlib
 

@@ -25,7 +25,7 @@ from contactopt.checks import short
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, remark_list, write_html
 from contactopt.figures.page_data import page_data
-from contactopt.outcome import pair_rows, summary_rows
+from contactopt.outcome import pair_rows, summary_rows, titled
 
 WORDS = {
     "peak": "peak pressure",
@@ -51,7 +51,7 @@ def write_page(folder: str | Path, file: str | Path) -> Path:
         ):
             summary = json.loads((folder / "summary.json").read_text())
             data = page_data(folder, summary)
-            title, body = f"contactopt: {summary['scene']}", _body(summary, data)
+            title, body = f"contactopt: {titled(summary)}", _body(summary, data)
             json.dumps(data, allow_nan=False)
     # a damaged file breaks its reader in any way; that of meshio exits
     except (Exception, SystemExit) as error:
@@ -65,8 +65,8 @@ def write_page(folder: str | Path, file: str | Path) -> Path:
 
 def certificate_words(summary: dict[str, Any]) -> str:
     """What the certificate says, for people who meet it for the first time."""
-    residual = summary["residual"]
-    if summary["status"] == "infeasible":
+    residual, shown = summary["residual"], summary.get("shown")
+    if summary["status"] == "infeasible" and not shown:
         return (
             "No forces solve this problem: a proof of that"
             " was found. What is shown is the last iterate."
@@ -81,6 +81,8 @@ def certificate_words(summary: dict[str, Any]) -> str:
     if summary["status"] == "solved":
         return f"These forces are a solution. {said}"
     why = summary.get("message") or summary["status"]
+    if shown:
+        return f"The path ends after {shown}, whose forces are a solution. {said} Then: {why}"
     return f"This is not a solution, only the last iterate ({why}). {said}"
 
 
@@ -111,7 +113,7 @@ def _body(summary: dict[str, Any], data: dict[str, Any]) -> str:
     opened = "" if summary["status"] == "solved" else " open"
     return filled(
         "view.html",
-        scene=html.escape(summary["scene"]),
+        scene=html.escape(titled(summary)),
         certificate=f"<details{opened}><summary>{html.escape(verdict)}.</summary>"
         f"<p>{html.escape(certificate)}</p></details>",
         remarks=remark_list(summary.get("remarks", ())),

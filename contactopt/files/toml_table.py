@@ -271,7 +271,7 @@ def _step(table: Table, told: str, place: Place, key: str, at: Any) -> str | int
     return number - 1 if number > 0 else key
 
 
-def _lost(table: Table, told: str, parents: Any, key: str | int, at: Any) -> InputError:
+def _lost(table: Table, told: str, parents: Place, key: str | int, at: Any) -> InputError:
     """What to raise where a key leads nowhere."""
     where = ".".join(str(part + 1) if isinstance(part, int) else part for part in parents)
     if isinstance(at, list):

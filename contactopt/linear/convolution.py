@@ -169,7 +169,7 @@ class Kernel:
         }
         out = np.zeros((len(rows), *self.grid), kind)
         for place, a in enumerate(rows):
-            total: Any = None
+            total: np.ndarray | None = None
             for b, spectrum in spectra.items():
                 pair = (min(a, b), max(a, b))
                 if pair not in symbols:

@@ -14,6 +14,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -127,7 +128,7 @@ def _kernel() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _bodies(gmsh: Any, dim: int) -> dict[str, int]:
+def _bodies(gmsh: ModuleType, dim: int) -> dict[str, int]:
     """Name -> entity of each body. Names are those of the file, if they are fit for one."""
     found: dict[str, int] = {}
     for _, tag in gmsh.model.getEntities(dim):
@@ -137,7 +138,7 @@ def _bodies(gmsh: Any, dim: int) -> dict[str, int]:
     return found
 
 
-def _sides(gmsh: Any, dim: int, body: int) -> dict[str, int]:
+def _sides(gmsh: ModuleType, dim: int, body: int) -> dict[str, int]:
     """Name -> entity of the faces, or edges, of a body."""
     found: dict[str, int] = {}
     counts: dict[str, int] = {}
@@ -150,7 +151,7 @@ def _sides(gmsh: Any, dim: int, body: int) -> dict[str, int]:
     return found
 
 
-def _direction(gmsh: Any, dim: int, body: int, tag: int) -> str:
+def _direction(gmsh: ModuleType, dim: int, body: int, tag: int) -> str:
     """The axis along which the outward normal of a flat side lies, as 'z+', or ''."""
     low, high = (np.array(ends) for ends in gmsh.model.getParametrizationBounds(dim - 1, tag))
     grid = np.stack(np.meshgrid(*([GRID] * (dim - 1)))).reshape(dim - 1, -1).T
@@ -184,7 +185,7 @@ def _called(sides: Mapping[str, int], name: str, path: Path) -> list[int]:
 
 
 def _place(
-    gmsh: Any,
+    gmsh: ModuleType,
     dim: int,
     sides: Mapping[str, int],
     new: Mapping[str, list[int]],
@@ -234,7 +235,7 @@ def _number(text: str) -> float:
         raise InputError(f"a radius is a number, as in radius=2; got {text!r}.") from error
 
 
-def _radius(gmsh: Any, dim: int, tag: int) -> float:
+def _radius(gmsh: ModuleType, dim: int, tag: int) -> float:
     """The smallest radius of curvature in the middle of a side, 0 where it is flat."""
     low, high = gmsh.model.getParametrizationBounds(dim - 1, tag)
     curvature = abs(gmsh.model.getCurvature(dim - 1, tag, (np.array(low) + high) / 2)[0])
@@ -242,7 +243,7 @@ def _radius(gmsh: Any, dim: int, tag: int) -> float:
 
 
 def _sizes(
-    gmsh: Any,
+    gmsh: ModuleType,
     dim: int,
     bodies: Iterable[int],
     size: float | None,
@@ -278,7 +279,7 @@ def _sizes(
 
 
 def _groups(
-    gmsh: Any,
+    gmsh: ModuleType,
     dim: int,
     bodies: Mapping[str, int],
     sides: Mapping[str, int],

@@ -9,14 +9,19 @@ Source: MED file format, EDF and CEA, version 4.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem import Mesh
 
 from contactopt.meshes.cells import mirrored
 from contactopt.meshes.mesh_repair import in_order
+
+if TYPE_CHECKING:
+    import h5py
+    import meshio
 
 
 def read_med(path: Path) -> Any:
@@ -36,13 +41,13 @@ def read_med(path: Path) -> Any:
         return _mesh(mesh, file["ENS_MAA"][name].attrs["ESP"], file.get(f"FAS/{name}", {}))
 
 
-def _one(group: Any, what: str) -> list[str]:
+def _one(group: Collection[str], what: str) -> list[str]:
     if len(group) != 1:
         raise ValueError(f"it holds {len(group)} {what}, not one")
     return list(group)
 
 
-def _mesh(mesh: Mesh, dim: int, families: Any) -> Any:
+def _mesh(mesh: Mesh, dim: int, families: h5py.Group) -> meshio.Mesh:
     import meshio
     from meshio.med._med import med_to_meshio_type
 
@@ -68,7 +73,7 @@ def _mesh(mesh: Mesh, dim: int, families: Any) -> Any:
     return meshio.Mesh(places, cells, cell_sets=sets, point_sets=nodes_of)
 
 
-def _groups(families: Any, kind: str) -> dict[str, list[int]]:
+def _groups(families: h5py.Group, kind: str) -> dict[str, list[int]]:
     """Name of each group -> numbers of its families."""
     found: dict[str, list[int]] = {}
     for family in families[kind].values() if kind in families else ():

@@ -91,7 +91,9 @@ def split(mesh: Mesh, curves: Curves) -> Any:
     return bent(fine, curves) if is_curved(mesh) else fine
 
 
-def _refined(mesh: Mesh, how: Any, curves: Curves, places: np.ndarray | None = None) -> Any:
+def _refined(
+    mesh: Mesh, how: int | np.ndarray, curves: Curves, places: np.ndarray | None = None
+) -> Mesh:
     """The mesh divided as scikit-fem is told, its new nodes at `places`, if any, and on curves."""
     fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
@@ -202,7 +204,7 @@ def _shift(
     shift[:, nodes[near]] = off[:, near]
 
 
-def named_like(old: Any, new: Any) -> Any:
+def named_like(old: Mesh, new: Mesh) -> Mesh:
     """Give a mesh of the same body, or of a part of it, the named boundaries of another one, whose
     boundary facets hold its own.
     """

@@ -11,11 +11,21 @@ Source: Gmsh reference manual, version 4.15, chapter "MSH file format".
 
 from __future__ import annotations
 
+import re
 import shlex
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+# sections of results: $NodeData ... $EndNodeData
+VIEWS = re.compile(
+    rb"^\$(NodeData|ElementData|ElementNodeData|InterpolationScheme)\b.*?^\$End\1\s*",
+    re.DOTALL | re.MULTILINE,
+)
 
 
 def version(path: Path) -> tuple[str | None, bool]:
@@ -35,6 +45,22 @@ def parametric(path: Path) -> bool:
     """Whether a file of version 2 has parametric nodes."""
     with path.open("rb") as file:
         return any(line.startswith(b"$ParametricNodes") for line in file)
+
+
+@contextmanager
+def without_views(path: Path) -> Iterator[Path]:
+    """A copy of a file of version 2 without the results in it, or the file if it has none. meshio
+    refuses those that are known at some nodes only.
+    """
+    data = path.read_bytes()
+    kept = VIEWS.sub(b"", data)
+    if len(kept) == len(data):
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        copy.write_bytes(kept)
+        yield copy
 
 
 def read_msh4(path: Path) -> Any:
@@ -162,10 +188,10 @@ class _Bytes(_Numbers):
         return values.astype(float if kind == "f8" else np.int64)
 
 
-def _sections(path: Path) -> dict[str, Any]:
+def _sections(path: Path) -> dict[str, _Numbers]:
     """The sections, from which numbers can be taken."""
     data, binary = path.read_bytes(), version(path)[1]
-    found: dict[str, Any] = {}
+    found: dict[str, _Numbers] = {}
     one = data[data.index(b"\n", data.index(b"$MeshFormat") + 12) + 1 :][:4]
     order = ">" if one == b"\0\0\0\1" else "<"
     if binary and data.split(maxsplit=4)[3] != b"8":
@@ -185,7 +211,7 @@ def _sections(path: Path) -> dict[str, Any]:
     return found
 
 
-def _names(sections: dict[str, Any]) -> dict[tuple[int, int], str]:
+def _names(sections: dict[str, _Numbers]) -> dict[tuple[int, int], str]:
     """(dimension, number) -> name of physical groups."""
     data = sections["PhysicalNames"].data if "PhysicalNames" in sections else b""
     lines = data.decode(errors="replace").splitlines()
@@ -193,7 +219,7 @@ def _names(sections: dict[str, Any]) -> dict[tuple[int, int], str]:
     return {(int(dim), int(tag)): name for dim, tag, name in rows}
 
 
-def _groups(reader: Any, names: dict) -> dict[tuple[int, int], list[str]]:
+def _groups(reader: _Numbers | None, names: dict) -> dict[tuple[int, int], list[str]]:
     """(dimension, entity) -> names of its physical groups, or numbers of those without a name."""
     found = {}
     if reader is not None:
@@ -208,7 +234,7 @@ def _groups(reader: Any, names: dict) -> dict[tuple[int, int], list[str]]:
     return found
 
 
-def _nodes(reader: Any) -> tuple[np.ndarray, np.ndarray]:
+def _nodes(reader: _Numbers) -> tuple[np.ndarray, np.ndarray]:
     """Tags of the nodes (n,) and their places (n, 3)."""
     tags, points = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
     for _ in range(reader.head()):

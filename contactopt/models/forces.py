@@ -33,7 +33,7 @@ def normal(problem: InterfaceProblem, form: str = "dual") -> Program:
 
     Parameters
     ----------
-    problem : Any interface problem.
+    problem : An interface problem.
     form : 'dual' in forces, or 'primal' in displacements.
 
     Returns
@@ -65,7 +65,7 @@ def penalised(problem: InterfaceProblem, stiffness: float = 1e3, form: str = "du
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : An interface problem; backends want it dimensionless.
     stiffness : Of each contact node [force / length].
     form : As for `normal`.
 
@@ -118,7 +118,7 @@ def tangential(problem: InterfaceProblem, facets: int | None = None, form: str =
 
     Parameters
     ----------
-    problem : Any interface problem; backends want it dimensionless.
+    problem : An interface problem; backends want it dimensionless.
     facets : Number of edges of the regular polygon that is inscribed in each disc; None for discs,
         which are intervals in 2D.
     form : As for `normal`.
@@ -289,7 +289,7 @@ def _friction(
     return polygon, read, lambda: reach * dual(polygon).sum(axis=0)
 
 
-def _balance(resultant: Any, name: str) -> tuple[list[Any], dict[str, Reader]]:
+def _balance(resultant: cp.Expression, name: str) -> tuple[list[Any], dict[str, Reader]]:
     """resultant = 0 and the reader of its multiplier; nothing without plates."""
     if resultant.size == 0:
         return [], {name: lambda: np.zeros(0)}

@@ -166,7 +166,7 @@ def _slip(problem: InterfaceProblem, u_t: object, facets: int | None) -> Any:
     return cp.norm(u, 2, axis=0) if reach is None else cp.max(-reach @ u, axis=0)
 
 
-def _reaction(S: Any, z: Any) -> dict[str, Reader]:
+def _reaction(S: cp.Expression, z: cp.Variable) -> dict[str, Reader]:
     def read() -> np.ndarray:
         if z.value is None:
             raise InputError(
@@ -178,7 +178,11 @@ def _reaction(S: Any, z: Any) -> dict[str, Reader]:
 
 
 def _program(
-    problem: Any, u: Any, lam: Any, parameters: dict[str, Any], readers: dict[str, Reader]
+    problem: cp.Problem,
+    u: cp.Variable,
+    lam: cp.Variable,
+    parameters: dict[str, Any],
+    readers: dict[str, Reader],
 ) -> Program:
     """The program with its variables by name, lambda only where there are plates."""
     variables = {"u": u} | ({"lambda": lam} if lam.size else {})

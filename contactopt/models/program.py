@@ -46,7 +46,7 @@ class Program:
     statement    the program as mathematics, which `str` shows
     """
 
-    problem: Any
+    problem: cp.Problem
     variables: dict[str, Any]
     parameters: dict[str, Any]
     readers: dict[str, Reader]
@@ -129,12 +129,12 @@ def corners(facets: int | None, dim: int) -> np.ndarray | None:
     return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def columns(t: Any, k: int) -> Any:
+def columns(t: cp.Expression, k: int) -> cp.Expression:
     """A flat vector of k blocks with the blocks as its columns."""
     return cp.reshape(t, (t.size // k, k), order="F")
 
 
-def blockwise(blocks: np.ndarray | None, t: Any) -> Any:
+def blockwise(blocks: np.ndarray | None, t: cp.Expression) -> cp.Expression:
     """The matrices (k, d, d), one for each block, times a flat vector; None for ones."""
     return t if blocks is None else sp.block_diag(list(blocks), format="csr") @ t
 
@@ -144,7 +144,7 @@ def matrix(Q: np.ndarray, name: str = "Q") -> Any:
     return cp.psd_wrap(cp.Constant((Q + Q.T) / 2, name=name))
 
 
-def dual(constraint: Any, part: int | None = None) -> np.ndarray:
+def dual(constraint: cp.Constraint, part: int | None = None) -> np.ndarray:
     """The multiplier of a constraint; InputError before a solve."""
     value = constraint.dual_value if part is None else constraint.dual_value[part]
     if value is None:

@@ -45,11 +45,13 @@ from contactopt.problem.laws.law import Law
 
 # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
 SYMMETRIC = 1e-2
+TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
+GENERIC = np.sqrt([1.0, 2.0, 3.0])  # a direction that no lattice of contacts repeats
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class InterfaceProblem:
-    """Contact at k nodes in `dim` dimensions, as in the head of this module.
+    """Contact at k nodes in `dim` dimensions, as at the top of this module.
 
     Q            (k dim, k dim) compliance [length / force]: an array, a scipy sparse matrix (kept
                  as csr_array), or an InterfaceOperator that knows it by its products only. Elastic
@@ -86,9 +88,9 @@ class InterfaceProblem:
 
     def __init__(
         self,
-        Q: Any,
+        Q: ArrayLike | Interface,
         q: ArrayLike,
-        law: Any = None,
+        law: Law | float | np.ndarray | None = None,
         V: ArrayLike = (),
         s: ArrayLike = (),
         areas: ArrayLike = (),
@@ -112,8 +114,8 @@ class InterfaceProblem:
             raise InputError(
                 "V has columns but s is empty; give the resultant s of every column of V."
             )
-        law = mu if law is None else law
-        law = law if isinstance(law, Law) else Coulomb(law)
+        given_law: Any = mu if law is None else law
+        law = given_law if isinstance(given_law, Law) else Coulomb(given_law)
         places = np.arange(float(k))[None]
         if given(coordinates):
             places = np.atleast_2d(real_array("coordinates", coordinates))
@@ -226,11 +228,28 @@ class InterfaceProblem:
         return lengths(self.q)
 
     @cached_property
+    def shared_places(self) -> list[np.ndarray]:
+        """The contacts at every place that has several."""
+        x = self.coordinates
+        if x.shape[1] != self.contacts or self.contacts < 2:
+            return []
+        near = TOGETHER * (x.max(axis=1) - x.min(axis=1)).max()
+        line = GENERIC[: len(x)] @ x  # no two points of a grid fall together
+        line.sort()
+        if (line[1:] - line[:-1]).min() > GENERIC.sum() * near:
+            return []
+        cell = np.round(x.T / (near or 1.0))
+        own, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)[1:]
+        own = own.ravel()
+        order = np.argsort(own, kind="stable")
+        return [one for one in np.split(order, np.cumsum(counts)[:-1]) if len(one) > 1]
+
+    @cached_property
     def reach(self) -> np.ndarray:
         """(p,) largest entry of every column of V."""
         return np.asarray(np.abs(self.V).max(axis=0, initial=0.0))
 
-    def altered(self, **values: Any) -> InterfaceProblem:
+    def altered(self, **values: object) -> InterfaceProblem:
         """The same problem with other values of its fields, which must fit and are not checked."""
         other = object.__new__(InterfaceProblem)
         other.__dict__.update({name: self.__dict__[name] for name in self.__dataclass_fields__})
@@ -254,7 +273,7 @@ def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
     return array
 
 
-def _compliance(Q: Any, n: int) -> Interface:
+def _compliance(Q: ArrayLike | Interface, n: int) -> Interface:
     """Q (n, n) in one of its three forms, as an array or rows of its own."""
     if sp.issparse(Q):
         if np.iscomplexobj(Q):

@@ -13,8 +13,6 @@ problems, Journal of Elasticity 2.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from skfem import Mesh
 
@@ -116,7 +114,7 @@ def re_entrant(mesh: Mesh, vertex: int) -> bool:
     return any(filled(cells, node) > 0.5 + CORNER / (2 * np.pi) for node in outer)
 
 
-def filled(cells: Any, vertex: int) -> float:
+def filled(cells: Mesh, vertex: int) -> float:
     """The share of the full angle around a vertex that the simplices at it fill [-]."""
     corner, element = np.nonzero(cells.t == vertex)
     others = np.stack([np.delete(cells.t[:, e], c) for c, e in zip(corner, element)], axis=1)

@@ -10,13 +10,16 @@ is the same whether the lower body is held or pressed by a plate.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from contactopt.bodies.protocol import Body
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 CLOSED = 1e-3  # a mean direction shorter than this is that of a surface around a body
 ROUNDED = 1e-12  # share of the motions of the bodies below which what they make is rounding
@@ -117,7 +120,7 @@ def _along_symmetry(reduction: Reduction, mean: np.ndarray, component: int) -> n
     return mean
 
 
-def _has_plate(part: Any) -> bool:
+def _has_plate(part: AnyPart) -> bool:
     """Whether a total force moves a part."""
     loads = getattr(part, "loads", ())
     return any(load.level for load in loads) or bool(getattr(part, "force", None))

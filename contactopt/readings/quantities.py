@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -241,7 +240,7 @@ def _motion(state: State, component: int) -> Seeds:
     by_r, by_motions, by_U = np.zeros(state.problem.q.shape), [], []
     for body, B, weights in zip(reduction.bodies, reduction.maps, sign * found.weights):
         own = np.zeros(len(body.motions.resultants))
-        total: Any = None
+        total: np.ndarray | None = None
         for c in np.flatnonzero(weights):
             w, moved = (weights[c] * each for each in body.carried(int(c)))
             rates = w @ body.motions.fields

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from skfem import Mesh
@@ -78,8 +78,8 @@ class Part:
     loads: tuple[Load, ...] = ()
     contact: str = "contact"
     curve: Function | Mapping[str, Function] | None = None
-    elastic = True
-    meshed = True
+    elastic: ClassVar[Literal[True]] = True
+    meshed: ClassVar[Literal[True]] = True
 
     def __post_init__(self) -> None:
         check_name("the body's name", self.name)  # of its VTU file
@@ -160,8 +160,8 @@ class Rigid:
     force: Mapping[str, float] | None = None
     displacement: Mapping[str, float] | None = None
 
-    elastic = False
-    meshed = False
+    elastic: ClassVar[Literal[False]] = False
+    meshed: ClassVar[Literal[False]] = False
     given = False
 
     def __post_init__(self) -> None:
@@ -214,8 +214,8 @@ class HalfSpace:
     displacement: Mapping[str, float] | None = None
     periodic: bool = False
     depth: float | None = None
-    elastic = True
-    meshed = False
+    elastic: ClassVar[Literal[True]] = True
+    meshed: ClassVar[Literal[False]] = False
 
     def __post_init__(self) -> None:
         check_name("the body's name", self.name)

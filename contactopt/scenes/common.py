@@ -6,7 +6,7 @@ import inspect
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from contactopt.checks import check_number
 from contactopt.errors import InputError
 from contactopt.material import Material
 from contactopt.scenes.scene import Part, Rigid, Scene
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 RUBBER = Material(E=5.0, nu=0.3)  # MPa, the material of all the paper's bodies
 UNITS = ("mm", "MPa")
@@ -87,7 +90,7 @@ def one_of(rigid: str | None, stiff: Rigid, elastic: Part) -> Part | Rigid:
     return stiff if rigid == stiff.name else elastic
 
 
-def upper_of(scene: Scene, **changes: Any) -> Scene:
+def upper_of(scene: Scene, **changes: object) -> Scene:
     """The scene with other fields of its upper body."""
     upper: Any = scene.upper
     return replace(scene, upper=replace(upper, **changes))
@@ -103,7 +106,7 @@ def with_elements(scene: Scene, degree: int | None = None, simplices: bool = Fal
     its quadrilaterals and hexahedra are cut into triangles and tetrahedra.
     """
 
-    def cut(part: Any) -> Any:
+    def cut(part: AnyPart) -> AnyPart:
         if not simplices or not part.meshed:
             return part
 

@@ -92,7 +92,7 @@ class Contact:
         return f"{name} = {' and '.join(f'{mu:g}' for mu in values)}" if one else f"{name} varies"
 
 
-def _check_direction(name: str, direction: Any, law: type[Law]) -> None:
+def _check_direction(name: str, direction: object, law: type[Law]) -> None:
     if not law.directed:
         directed = " or ".join(repr(own) for own in LAWS if find_law(own).directed)
         raise InputError(

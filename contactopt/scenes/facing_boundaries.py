@@ -8,7 +8,7 @@ than a distance. So facets that lie beside each other do not, and overlaps count
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,7 +61,7 @@ def facing_boundaries(meshes: Mapping[str, Any], distance: float) -> list[Facing
     return found
 
 
-def as_toml(pairs: Iterable[Facing], mu: Any, length: str) -> str:
+def as_toml(pairs: Iterable[Facing], mu: float | Sequence[float], length: str) -> str:
     """The pairs as the tables of a scene file, with their friction and a unit of length or ''."""
     unit = length and f" {length}"
     return "\n".join(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import counts_of, grid_of, scale_of
 from contactopt.scenes.expressions import Expression
 from contactopt.scenes.rough_surfaces import self_affine
+
+if TYPE_CHECKING:
+    from contactopt.scenes.body_kinds import Function
 
 MOST_POINTS = 4_000_000
 WAVES = ("hurst", "longest", "shortest", "roll_off", "slope")
@@ -35,7 +38,7 @@ def half_space_shape(
     if table.has("points", list):
         along = tuple(f"along {axis}" for axis in axes)
         counts = counts_of(table, "points", along, least=4, most=MOST_POINTS)
-    height: Any = None
+    height: Function | np.ndarray | None = None
     if isinstance(table.data.get("height"), dict):
         surface = table.table("height")
         if surface.has("file", str):

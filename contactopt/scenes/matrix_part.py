@@ -15,16 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.checks import check_name, check_size, real_array, short
 from contactopt.errors import InputError
-from contactopt.scenes.body_kinds import Support
+from contactopt.scenes.body_kinds import Body, Support
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.loads.plate import Plate
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 ORDERS = ("auto", "node", "component")
 SIZES = {2: (2, 3), 3: (3, 4, 6, 8, 9)}  # dimension -> how many points a facet may have
@@ -35,7 +38,7 @@ SYMMETRIC = 1e-9  # largest |K - K'| over the largest |K|
 
 @dataclass(frozen=True, eq=False)
 class MatrixPart:
-    """An elastic body given by its stiffness K and loads f, as in the head of this module.
+    """An elastic body given by its stiffness K and loads f, as at the top of this module.
 
     K            (n, n) sparse or dense, without boundary conditions, n = dim N for N points; or a
                  function (n,) -> (n,) that solves K U = F, or an object with such a method `solve`,
@@ -74,8 +77,8 @@ class MatrixPart:
     motions: Any = None
     solves: Callable[[np.ndarray], np.ndarray] | None = field(default=None, init=False)
 
-    elastic = True
-    meshed = False
+    elastic: ClassVar[Literal[True]] = True
+    meshed: ClassVar[Literal[False]] = False
     given = True
 
     def __post_init__(self) -> None:
@@ -132,7 +135,7 @@ class MatrixPart:
                         f" {', '.join(self.facets)}."
                     )
 
-    def _matrix(self, what: str, given: Any) -> sp.csr_matrix:
+    def _matrix(self, what: str, given: sp.spmatrix | np.ndarray) -> sp.csr_matrix:
         if not sp.issparse(given):
             given = real_array(f"{what} of body '{self.name}'", given)
             if given.ndim != 2:
@@ -193,7 +196,7 @@ class MatrixPart:
         x = self.points
         return np.asarray(x.T if x.shape[1] == dim else x)
 
-    def _check_facets(self, name: str, given: Any, dim: int) -> None:
+    def _check_facets(self, name: str, given: ArrayLike, dim: int) -> None:
         own = f"facets {name!r} of body '{self.name}'"
         facets = real_array(own, given)
         count = self.coordinates(dim).shape[1]
@@ -214,3 +217,6 @@ class MatrixPart:
             raise InputError(f"{own} name a point twice in one facet.")
         if len(np.unique(np.sort(facets, axis=1), axis=0)) < len(facets):
             raise InputError(f"{own} name a facet twice.")
+
+
+AnyPart = Body | MatrixPart

@@ -23,9 +23,9 @@ A body with several plates needs the boundary in force:BODY:BOUNDARY:COMPONENT a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,6 +36,10 @@ from contactopt.scenes.body_kinds import Support
 from contactopt.scenes.loads import Load, load_classes
 from contactopt.scenes.loads.bolt import BoltEnd
 from contactopt.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from contactopt.scenes.contact import Contact
+    from contactopt.scenes.matrix_part import AnyPart
 
 MATERIAL = ("E", "nu")
 FIELDS = ("gap", "friction")
@@ -48,7 +52,7 @@ FORM = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter by the parts of its name, as in the head of this module.
+    """One parameter by the parts of its name, as at the top of this module.
 
     owner  the name of a body or of a pair; empty for all of them
     """
@@ -64,7 +68,7 @@ class Parameter:
         """Whether it has one number per contact."""
         return self.kind in FIELDS
 
-    def concerns(self, part: Any) -> bool:
+    def concerns(self, part: AnyPart) -> bool:
         """Whether it is a constant of the material of that body, or one of its loads."""
         return self.kind in (*MATERIAL, *FORM) and self.owner in ("", part.name)
 
@@ -165,7 +169,7 @@ class Parameter:
         return item.values(scene.components) if own and there else {}
 
     def _missing(self, scene: Scene) -> str:
-        named: Any = scene.pairs if self.kind == "mu" else scene.parts
+        named: Sequence[Contact | AnyPart] = scene.pairs if self.kind == "mu" else scene.parts
         names = [one.name for one in named]
         if self.owner and self.owner not in names:
             return (
@@ -183,7 +187,7 @@ class Parameter:
         return f"{whose} has no such {self.kind}"
 
 
-def parameter(name: Any, scene: Scene) -> Parameter:
+def parameter(name: object, scene: Scene) -> Parameter:
     """Find one parameter of a scene by its name, in the form that this module's head lists.
 
     InputError if the name is unknown or what it names does not enter the scene.
@@ -214,7 +218,7 @@ def parameter(name: Any, scene: Scene) -> Parameter:
     return made
 
 
-def parameters(names: Any, scene: Scene) -> tuple[Parameter, ...]:
+def parameters(names: str | Iterable[str], scene: Scene) -> tuple[Parameter, ...]:
     """Find the parameters of a scene by their names, one or several, in their order.
 
     InputError if a parameter is named twice or does not enter the scene, or if none is named.

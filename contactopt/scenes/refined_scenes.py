@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem import Mesh
@@ -11,6 +11,9 @@ from skfem import Mesh
 from contactopt.meshes.given_curves import Curve
 from contactopt.meshes.mesh_refinement import Function, boundary_curves, split
 from contactopt.scenes.scene import Part, Scene
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 STEPS = 8  # of the iteration that keeps a coordinate
 
@@ -22,7 +25,7 @@ def split_scene(scene: Scene, elements: int, splits: int) -> Scene:
     New nodes lie on the `curve` of their part, or on the curve that the first mesh stands for.
     """
 
-    def finer(part: Any) -> Any:
+    def finer(part: AnyPart) -> AnyPart:
         if not part.meshed:
             return part
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contactopt.checks import check_number, check_size, short
 from contactopt.errors import InputError
-from contactopt.scenes.body_kinds import Body, HalfSpace, Part, Rigid, Support
+from contactopt.scenes.body_kinds import HalfSpace, Part, Rigid, Support
 from contactopt.scenes.body_shapes import LENGTHS
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.kinds import KINDS, Kind
@@ -24,7 +24,10 @@ from contactopt.scenes.loads.plate import Plate
 from contactopt.scenes.loads.pressure import Pressure
 from contactopt.scenes.loads.traction import Traction
 from contactopt.scenes.material_library import STRESSES
-from contactopt.scenes.matrix_part import MatrixPart
+from contactopt.scenes.matrix_part import AnyPart, MatrixPart
+
+if TYPE_CHECKING:
+    from contactopt.analytic import Reference
 
 __all__ = [
     "BodyForce",
@@ -78,8 +81,8 @@ class Scene:
     """
 
     name: str
-    upper: Body | MatrixPart | None = None
-    lower: Body | MatrixPart | None = None
+    upper: AnyPart | None = None
+    lower: AnyPart | None = None
     mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] | None = None
     kind: str = "plane-strain"
     thickness: float = 1.0
@@ -89,8 +92,8 @@ class Scene:
     elements: int = 16
     zone: float | None = None
     units: tuple[str, str] = ("length", "stress")
-    reference: Any = field(default=None, compare=False)
-    bodies: tuple[Body | MatrixPart, ...] = ()
+    reference: Reference | None = field(default=None, compare=False)
+    bodies: tuple[AnyPart, ...] = ()
     contacts: tuple[Contact, ...] = ()
     mirror: str | None = None
     state: str = ""
@@ -103,7 +106,7 @@ class Scene:
             raise self._wrong(f"unknown kind {self.kind!r}; choose from {', '.join(KINDS)}.")
         self._check_form()
         for part in self.parts:
-            if not isinstance(part, Body | MatrixPart):
+            if not isinstance(part, AnyPart):
                 raise self._wrong(
                     "a body must be a Part, a MatrixPart, a Rigid or a HalfSpace; got"
                     f" {short(part)}."
@@ -150,7 +153,7 @@ class Scene:
         return "; ".join(dict.fromkeys(pair.friction for pair in self.pairs))
 
     @property
-    def parts(self) -> tuple[Body | MatrixPart, ...]:
+    def parts(self) -> tuple[AnyPart, ...]:
         """The bodies; in the short form the upper one first."""
         if self.upper is None or self.lower is None:
             return self.bodies
@@ -198,15 +201,15 @@ class Scene:
         if not names:
             object.__setattr__(self, "bodies", parts)
 
-    def surfaces_of(self, part: Any) -> tuple[str, ...]:
+    def surfaces_of(self, part: Part | MatrixPart) -> tuple[str, ...]:
         """The boundaries of a part that contacts use, each once, in the order of the pairs."""
         return tuple(dict.fromkeys(name for name, _ in self._uses(part))) or (part.contact,)
 
-    def laws_of(self, part: Any, boundary: str) -> set[str]:
+    def laws_of(self, part: Part | MatrixPart, boundary: str) -> set[str]:
         """The contact laws of the pairs that use a boundary; none where no pair uses it."""
         return {pair.law for name, pair in self._uses(part) if name == boundary}
 
-    def _uses(self, part: Any) -> list[tuple[str, Contact]]:
+    def _uses(self, part: Part | MatrixPart) -> list[tuple[str, Contact]]:
         """The boundaries of a part that pairs use, each with its pair."""
         return [
             (surface or part.contact, pair)
@@ -314,7 +317,7 @@ class Scene:
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")
 
 
-def check_units(units: Any) -> None:
+def check_units(units: object) -> None:
     """Raise InputError unless these are the names of a unit of length and of one of stress. A name
     that is known but for its capital letters would not be known.
     """
@@ -330,7 +333,7 @@ def check_units(units: Any) -> None:
             raise InputError(f"there is no unit of {what} {name!r}; did you mean {same[0]!r}?")
 
 
-def _curved(part: Any) -> bool:
+def _curved(part: AnyPart) -> bool:
     """Whether a body has a given mesh of second order."""
     mesh = getattr(part, "mesh", None)
     if not hasattr(mesh, "nvertices"):

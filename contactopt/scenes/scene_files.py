@@ -11,7 +11,7 @@ import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +25,12 @@ from contactopt.scenes.file_bodies import FileContext, bolted, function_of, read
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import Named, library, read_materials
 from contactopt.scenes.scene import Scene, check_units
+
+if TYPE_CHECKING:
+    from skfem import Mesh
+
+    from contactopt.scenes.body_kinds import Part, Support
+    from contactopt.scenes.loads import Load
 
 MOST_STATES = 10_000  # of a step of a load path
 AUTO = "auto"  # in place of the contacts: they are found
@@ -215,12 +221,13 @@ def _found(top: Table, parts: list[Any], reading: FileContext) -> list[Table]:
     return [Table(top.file, top.lines, own | mu, ("contacts",)) for own in pairs]
 
 
-def _free(part: Any) -> Any:
+def _free(part: Part) -> Mesh:
     """The mesh of a part with those boundaries that share no facet with those of supports and
     loads, and are not the whole surface where there are others.
     """
     named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
-    used = [named[o.boundary] for o in (*part.supports, *part.loads) if o.boundary in named]
+    holders: tuple[Support | Load, ...] = (*part.supports, *part.loads)
+    used = [named[own.boundary] for own in holders if own.boundary in named]
     taken = np.concatenate([np.zeros(0, dtype=int), *used])
     whole = len(part.mesh.boundary_facets())
     free = {name: own for name, own in named.items() if not np.isin(own, taken).any()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from skfem import Mesh
@@ -22,6 +22,9 @@ from contactopt.simplification.constants import NEAR
 from contactopt.simplification.images import Images, Plane
 from contactopt.simplification.proof import Fold, Key
 from contactopt.simplification.whole import Whole, of_mesh, with_pairs
+
+if TYPE_CHECKING:
+    from contactopt.scenes.loads.load import Load
 
 
 def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
@@ -135,7 +138,7 @@ def _doubled(values: Any) -> Any:
     return {name: 2 * value for name, value in values.items()} if values else values
 
 
-def _of_both(load: Any, components: tuple[str, ...]) -> Any:
+def _of_both(load: Load, components: tuple[str, ...]) -> Load:
     """A load that stands for two: a plate and a bolt have the force of all images."""
     return load.with_values(_doubled(load.values(components))) if load.total else load
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -18,6 +18,11 @@ from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part
 from contactopt.simplification.constants import EQUAL, NEAR, ROUNDED
 from contactopt.simplification.whole import Whole
+
+if TYPE_CHECKING:
+    from contactopt.meshes.given_curves import Curve
+    from contactopt.scenes.body_kinds import Rigid, Support
+    from contactopt.scenes.loads import Load
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,11 +147,11 @@ class _Condition(NamedTuple):
     where: str
     space: np.ndarray
     values: np.ndarray
-    item: Any
+    item: Support | Load | None
     number: float = 0.0
 
 
-def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
+def _conditions(part: Part | Rigid, components: tuple[str, ...]) -> Iterator[_Condition]:
     """All of a body."""
     whole = np.eye(len(components))
     if not part.meshed:
@@ -155,7 +160,8 @@ def _conditions(part: Any, components: tuple[str, ...]) -> Iterator[_Condition]:
         normal = np.zeros(len(components)) if part.normal is None else np.array(part.normal, float)
         yield _Condition("normal", "", whole, normal / (np.linalg.norm(normal) or 1.0), None)
         return
-    for item in (*part.supports, *part.loads):
+    holders: tuple[Support | Load, ...] = (*part.supports, *part.loads)
+    for item in holders:
         kind = item.what + ("" if getattr(item, "glued", True) else " that slides")
         kind += "" if getattr(item, "tilting", True) else " that stays parallel"
         values = item.values(components)
@@ -203,7 +209,7 @@ class _Comparison:
             twins[surface] = found[0]
         return twins
 
-    def _plates(self, part: Any, image: Any) -> set[tuple[str, int]]:
+    def _plates(self, part: Any, image: Part | Rigid) -> set[tuple[str, int]]:
         """Plates that are their own images, if all conditions have images."""
         components, H, found = self.whole.scene.components, self.plane.reflection, set()
         others = list(_conditions(image, components))
@@ -224,7 +230,7 @@ class _Comparison:
                 raise _Differs(f"the {one.kind}{place} of body '{part.name}' has no mirror image")
         return found
 
-    def _compare_curves(self, part: Part, surface: str, other: Any) -> None:
+    def _compare_curves(self, part: Part, surface: str, other: Curve | None) -> None:
         curve, x = part.curve_of(surface), self.whole.acting(part.name, surface)
         if curve is None and other is None:
             return

@@ -8,7 +8,7 @@ a tied pair say whether it would have opened or slipped.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -56,7 +56,13 @@ def offered_joints(scene: Scene, solved: Solved) -> list[Simplification]:
 
 
 def _offer(
-    scene: Scene, solved: Solved, names: list[str], law: str, what: str, why: str, verdict: Any
+    scene: Scene,
+    solved: Solved,
+    names: list[str],
+    law: str,
+    what: str,
+    why: str,
+    verdict: Callable[[list[str], Solved], str],
 ) -> Simplification | None:
     """Another law for some pairs, with what it changes; None without pairs or a solution."""
     if not names:
@@ -78,7 +84,11 @@ def _offer(
     return Simplification(name, what, why, *sizes, made, error=error, check=check)
 
 
-def _use_of_friction(solved: Solved, pair: Pair, value: Any) -> float:
+def _use_of_friction(
+    solved: Solved,
+    pair: Pair,
+    value: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any],
+) -> float:
     """The largest |r_t| / (mu r_n) of a pair; infinite if a contact is open or pulls."""
     r = solved.solution.reactions[pair.contacts]
     mu = value(solved.reduction.problem.coordinates[:, pair.contacts]) if callable(value) else value

@@ -18,7 +18,7 @@ than once, as in a search for an accuracy.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -32,6 +32,9 @@ from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 from contactopt.simplification.constants import NEAR
 from contactopt.solving.solve_scene import Solved
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 Key = tuple[str, str]  # ("body", its name) or ("pair", its name)
 # ("body" or "pair", name), points (dim, k) of the larger scene -> the same of the smaller one, and
@@ -101,7 +104,7 @@ class Spread:
             turns = turns @ more
         return key, x, turns
 
-    def displacement(self, each: Any, body: Any) -> np.ndarray:
+    def displacement(self, each: AnyPart, body: Any) -> np.ndarray:
         """U (n,) of a body of the whole; of a rigid one its translation, then zeros."""
         if not each.meshed:
             dim = len(body.components)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import skfem
@@ -24,6 +24,9 @@ from contactopt.simplification.findings import Simplification
 from contactopt.simplification.images import equal_functions
 from contactopt.simplification.proof import Key
 from contactopt.simplification.whole import Whole, of_mesh, whole_of, with_pairs
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class _Prism:
 
 
 def section(whole: Whole) -> tuple[list[Simplification], list[str]]:
-    """The section that stands for a solid, if there is one, or a sentence about what spoils it."""
+    """The section that stands for a solid, if there is one, or a sentence on what prevents it."""
     reasons = []
     for prism in _prisms(whole):
         reason, component = _spoils(prism), whole.scene.components[prism.axis]
@@ -157,7 +160,7 @@ def _flattened(prism: _Prism) -> Scene:
     def curve(function: Callable[[np.ndarray], np.ndarray]) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: function(prism.lift(x))[axes]
 
-    def part_of(part: Any) -> Any:
+    def part_of(part: Any) -> AnyPart:
         if not part.meshed:
             normal = None if part.normal is None else tuple(part.normal[axis] for axis in axes)
             given = {"force": values(part.force), "displacement": values(part.displacement)}

@@ -19,7 +19,7 @@ from contactopt.readings.plate_motions import motion
 from contactopt.readings.resultants import columns
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult, State
-from contactopt.solving.sliding import sliding, sliding_words
+from contactopt.solving.sliding import ending, sliding, sliding_words, unheld_words
 from contactopt.solving.solve_scene import Options, Solved, solve_loaded, solve_scene
 
 Forces = list[tuple[np.ndarray, np.ndarray]]
@@ -106,12 +106,14 @@ def _next_state(
     try:
         return solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
     except InputError as error:
-        raised = type(error)(f"{named}: {error}")
-        if isinstance(raised, Unbalanced):
-            last = replace(
-                states[-1].solution, status=Status.INFEASIBLE, residual=np.inf, message=str(raised)
-            )
-            raised.path = PathResult(tuple(states), solved.reduction, last)
+        if not isinstance(error, Unbalanced):
+            raise type(error)(f"{named}: {error}") from error
+        problem, last = solved.reduction.loaded(scene).problem, states[-1]
+        names = named, f"state {len(states)}"
+        words = unheld_words(str(error), problem, scene, (last.solution, last.s), names)
+        failed = replace(last.solution, status=Status.INFEASIBLE, residual=np.inf, message=words)
+        raised = Unbalanced(words)
+        raised.path = PathResult(tuple(states), solved.reduction, failed)
         raise raised from error
 
 
@@ -120,7 +122,7 @@ def _ended(now: Solved, states: list[State], named: str) -> Solution:
     solution, before = now.solution, f"state {len(states)}"
     slid = sliding(now.reduction.problem, solution, states[-1].solution)
     if slid is None:
-        message = f"{named}: {solution.message}; numbers and files are those of {before}"
+        message = f"{named}: {solution.message}{ending(before)}"
     else:
         message = sliding_words(slid, now.reduction.scene, named, before)
     return replace(solution, message=message)

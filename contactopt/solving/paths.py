@@ -126,6 +126,13 @@ class PathResult:
         return replace(found, **how)
 
     @property
+    def shown(self) -> str | None:
+        """The name of the last state, whose numbers are shown, where the step after it failed."""
+        said = self.states[-1].scene.state
+        name = f"state {len(self.states)}{said and f' ({said})'}"
+        return None if self.failed is None else name
+
+    @property
     def solutions(self) -> list[Solution]:
         """Those of all states, and that of the step that failed."""
         failed = [] if self.failed is None else [self.failed]

@@ -9,6 +9,7 @@ import numpy as np
 from contactopt.cards import force_unit
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
+from contactopt.problem.unbalanced_loads import escape
 from contactopt.scenes.scene import Scene
 
 NEAR = 0.9  # share of what friction bears from which on a state without a sticking contact slides
@@ -54,16 +55,48 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
     return found
 
 
+def _unit(scene: Scene, motion: str) -> str:
+    """The unit of the load along a motion: that of a force or of a moment."""
+    turns = f" {scene.units[0]}" if "rotation" in motion else ""
+    return f"{force_unit(scene.units)}{turns}"
+
+
+def ending(before: str) -> str:
+    """What a run shows of a path that ends after a state."""
+    return f"; numbers and files are those of {before}"
+
+
+def unheld_words(
+    why: str,
+    problem: InterfaceProblem,
+    scene: Scene,
+    last: tuple[Solution, np.ndarray],
+    names: tuple[str, str],
+) -> str:
+    """One sentence on a state that is known to have no solution, by the sentence on its load, after
+    a solved state, of which the solution and the resultants s are given. `names` are of both.
+    """
+    (solution, held), (state, before) = last, names
+    if slid := sliding(problem, solution, solution):
+        return sliding_words(slid, scene, state, before)
+    told, found = "", escape(problem)
+    if found is not None and problem.motions:
+        number = found.strongest
+        load, borne, unit = problem.s[number], held[number], _unit(scene, problem.motions[number])
+        told = f"; of these {load:.6g} {unit} it held {borne:.6g} {unit} in {before}"
+    return f"{state}: {why.removesuffix('.')}{told}{ending(before)}"
+
+
 def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
     """One sentence on a state that slides, after the state `before`; without one the forces are
     known too badly to say what friction holds.
     """
-    force, most = force_unit(scene.units), float(f"{found.most:.3g}")
+    force, most = _unit(scene, found.motion), float(f"{found.most:.3g}")
     load = f"the load along {found.motion} is {found.load:.6g} {force}"
     held = "more than friction holds"
     if before:
         held = held if np.isnan(most) else f"and it held up to about {most:.6g} {force} in {before}"
-        held += f"; numbers and files are those of {before}"
+        held += ending(before)
     return (
         f"{state} slides, every touching contact slips: {load}, {held}; contactopt limit finds the"
         " load that friction bears"

@@ -55,12 +55,12 @@ def problem_of(scene: Scene, Q: str = "explicit") -> InterfaceProblem:
     return reduce(scene, Q=Q)
 
 
-def reduced(name: str, **parameters: Any) -> InterfaceProblem:
+def reduced(name: str, **parameters: object) -> InterfaceProblem:
     """The interface problem, with explicit Q, of a scene made by `scene`."""
     return problem_of(scene(name, **parameters))
 
 
-def of_name(of: str, **parameters: Any) -> InterfaceProblem:
+def of_name(of: str, **parameters: object) -> InterfaceProblem:
     """The problem of a scene, of a family in OTHERS, or of two names such as "held punch-2d"."""
     name, _, inner = of.partition(" ")
     if name in OTHERS:
@@ -68,7 +68,7 @@ def of_name(of: str, **parameters: Any) -> InterfaceProblem:
     return reduced(of, **parameters)
 
 
-def pressing(of: str, **parameters: Any) -> tuple[InterfaceProblem, np.ndarray, float]:
+def pressing(of: str, **parameters: object) -> tuple[InterfaceProblem, np.ndarray, float]:
     """The problem `of` as if its plate were held at the origin; the displacements (k, dim) that its
     plate makes where it stands without friction, and how far it is pressed in [length].
 
@@ -84,7 +84,7 @@ def pressing(of: str, **parameters: Any) -> tuple[InterfaceProblem, np.ndarray, 
     return free, (made.V @ lam).reshape(made.q.shape), float(abs(lam[0]))
 
 
-def held(of: str, depth: float = 1.0, drag: float = 0.0, **parameters: Any) -> InterfaceProblem:
+def held(of: str, depth: float = 1.0, drag: float = 0.0, **parameters: object) -> InterfaceProblem:
     """The problem `of` with its plate held where it is pressed to: a problem without plates.
 
     The plate stands at `depth` times the place where its load brings it without friction, and is
@@ -106,7 +106,9 @@ def _pressed(problem: InterfaceProblem, family: str) -> Solution:
     return found
 
 
-def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) -> InterfaceProblem:
+def tangential(
+    of: str, mu: float = 0.5, shear: float = 0.3, **parameters: object
+) -> InterfaceProblem:
     """The friction of a scene under given normal forces (Tresca's problem) as a contact problem
     without coupling.
 
@@ -135,7 +137,7 @@ def tangential(of: str, mu: float = 0.5, shear: float = 0.3, **parameters: Any) 
     )
 
 
-def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
+def redundant(of: str, copies: int = 2, **parameters: object) -> InterfaceProblem:
     """Every contact of the problem `of` listed several times, so that Q is rank-deficient."""
     p = of_name(of, **parameters)
     index = np.repeat(np.arange(p.q.size).reshape(p.q.shape), copies, axis=0).ravel()
@@ -151,7 +153,7 @@ def redundant(of: str, copies: int = 2, **parameters: Any) -> InterfaceProblem:
 
 
 def in_units(
-    of: str, force: float = 1.0, length: float = 1.0, **parameters: Any
+    of: str, force: float = 1.0, length: float = 1.0, **parameters: object
 ) -> InterfaceProblem:
     """The scene in units where one newton is `force` and one millimetre `length`."""
     p = reduced(of, **parameters)
@@ -165,12 +167,12 @@ def in_units(
     )
 
 
-def by_products(of: str, **parameters: Any) -> InterfaceProblem:
+def by_products(of: str, **parameters: object) -> InterfaceProblem:
     """The scene `of`, with Q known by its products with vectors only."""
     return problem_of(scene(of, **parameters), "implicit")
 
 
-def skewed(of: str, skew: float = 0.1, seed: int = 0, **parameters: Any) -> InterfaceProblem:
+def skewed(of: str, skew: float = 0.1, seed: int = 0, **parameters: object) -> InterfaceProblem:
     """The problem `of` with D S D added to Q, S random and skew, |S| = skew, D^2 the diagonal."""
     made = of_name(of, **parameters)
     random = np.random.default_rng(seed).normal(size=made.Q.shape)

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,12 @@ PRESSING = 0.3  # share of a load path in which the body is pressed, before it i
 
 
 def load_path(
-    of: str, steps: int = 40, mu: float = 0.5, drag: float = 0.8, warm: bool = False, **given: Any
+    of: str,
+    steps: int = 40,
+    mu: float = 0.5,
+    drag: float = 0.8,
+    warm: bool = False,
+    **given: object,
 ) -> Sequence:
     """A plate presses the scene, and then moves to and fro along the first tangent, in space around
     a loop: quasi-static friction, u_t the slip since the last state.
@@ -48,7 +52,7 @@ def load_path(
 
 
 def growing_friction(
-    of: str, steps: int = 40, mu: float = 0.8, warm: bool = False, **given: Any
+    of: str, steps: int = 40, mu: float = 0.8, warm: bool = False, **given: object
 ) -> Sequence:
     """The problem `of`, with friction that grows from mu / steps to mu."""
     made = of_name(of, mu=mu, **given)

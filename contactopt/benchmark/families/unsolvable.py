@@ -6,7 +6,6 @@ Each of them has a ray that proves it, which `contactopt.problem.infeasibility` 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from contactopt.problem import InterfaceProblem
 BEYOND = 1.2  # the load over the largest one that friction holds
 
 
-def dragged(of: str, mu: float = 0.5, **parameters: Any) -> InterfaceProblem:
+def dragged(of: str, mu: float = 0.5, **parameters: object) -> InterfaceProblem:
     """The scene, its body free along the first tangent and dragged by more than mu r_n."""
     made = reduced(of, mu=mu, **parameters)
     along = np.zeros(made.q.shape)
@@ -26,7 +25,7 @@ def dragged(of: str, mu: float = 0.5, **parameters: Any) -> InterfaceProblem:
     return _with_motion(made, along, BEYOND * mu * _press(made))
 
 
-def toppled(of: str, **parameters: Any) -> InterfaceProblem:
+def toppled(of: str, **parameters: object) -> InterfaceProblem:
     """The scene, its body free to turn and pressed beside the place where it stands."""
     made = reduced(of, **parameters)
     x = made.coordinates[0] - made.coordinates[0].mean()

@@ -21,7 +21,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache, cached_property
 from threading import Lock
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.linalg as la
@@ -31,6 +31,9 @@ from contactopt.bodies.solvers.mkl import library
 from contactopt.bodies.solvers.system import BodySolver, System, out_of_memory
 from contactopt.errors import InputError
 from contactopt.linear.concurrency import cores
+
+if TYPE_CHECKING:
+    from pypardiso import PyPardisoSolver
 
 FACTORISE, SOLVE = 12, 33  # PARDISO's phases
 NO_MEMORY, NO_PIVOT = (-2, -9), -4  # its errors
@@ -52,7 +55,7 @@ def _alone(lock: Lock, act: Callable[..., Any], *given: Any) -> Any:
         return act(*given)
 
 
-def _free(lock: Lock, factors: Any) -> None:
+def _free(lock: Lock, factors: PyPardisoSolver) -> None:
     with suppress(RuntimeError):  # Python is ending: there is nothing left to free
         _threads().submit(_alone, lock, factors.free_memory, True)
 

@@ -150,7 +150,7 @@ def _at(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-def _handle(mkl: Any, A: sp.csr_matrix | sp.bsr_matrix) -> ctypes.c_void_p | None:
+def _handle(mkl: ctypes.CDLL, A: sp.csr_matrix | sp.bsr_matrix) -> ctypes.c_void_p | None:
     """oneMKL's view of A, not optimised, or None: 64-bit indices, blocks that are not square."""
     square = A.format == "csr" or A.blocksize[0] == A.blocksize[1]
     if not square or A.indices.dtype != np.int32 or A.nnz == 0:

@@ -13,12 +13,15 @@ import weakref
 from contextlib import suppress
 from math import isfinite
 from threading import Timer
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from contactopt.errors import BackendError
 from contactopt.files.writing import broken_pipe_is_an_error
 from contactopt.linear.deadline import TimeUp, check_time, time_left
 from contactopt.methods.backends import Backend
+
+if TYPE_CHECKING:
+    import numpy as np
 
 SMALL = 200  # unknowns of a program that is solved at once by every backend
 
@@ -57,7 +60,11 @@ class Child:
         return n > SMALL and not backend.clock and not backend.steps and isfinite(time_left())
 
     def solve(
-        self, arguments: dict[str, Any], name: str, start: Any, settings: dict[str, Any]
+        self,
+        arguments: dict[str, Any],
+        name: str,
+        start: np.ndarray | None,
+        settings: dict[str, Any],
     ) -> tuple[Any, Any]:
         """x and the multipliers y of qpsolvers.Problem(**arguments), None where there are none;
         TimeUp at the deadline, BackendError if the backend fails or its process dies.

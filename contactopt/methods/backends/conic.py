@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg as la
@@ -14,6 +14,8 @@ from contactopt.linear.deadline import check_time
 from contactopt.methods.backends import CONIC, Backend, find
 
 if TYPE_CHECKING:
+    import cvxpy as cp
+
     from contactopt.models import Program
 
 
@@ -40,7 +42,7 @@ class Conic:
         return variables | {name: np.nan_to_num(m) for name, m in self.program.multipliers.items()}
 
 
-def run(backend: Backend, problem: Any) -> None:
+def run(backend: Backend, problem: cp.Problem) -> None:
     """Solve a cvxpy problem; BackendError if the backend crashes or leaves no finite answer."""
     import cvxpy as cp
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,6 +13,9 @@ from contactopt.errors import BackendError
 from contactopt.linear.deadline import check_time, time_left
 from contactopt.methods.backends import CONIC, find
 from contactopt.methods.backends.conic import check_semidefinite
+
+if TYPE_CHECKING:
+    import clarabel  # type: ignore[import-untyped]
 
 
 @dataclass(eq=False)
@@ -23,14 +26,14 @@ class CoulombSOCP:
     and y lies in second-order cones for the others.
     """
 
-    solver: Any
+    solver: clarabel.DefaultSolver
     multipliers: int
 
     @classmethod
     def using(cls, Q: np.ndarray, mu: np.ndarray, V: np.ndarray, s: np.ndarray) -> CoulombSOCP:
         """BackendError if Q is not semidefinite, InputError if clarabel is not installed."""
         backend = find("clarabel", CONIC)
-        import clarabel  # type: ignore[import-untyped]
+        import clarabel
 
         Q = (Q + Q.T) / 2
         check_semidefinite(Q)

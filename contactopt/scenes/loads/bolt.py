@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.loads.load import Face, Load
 from contactopt.scenes.loads.plate import Plate
 from contactopt.scenes.loads.traction import Traction
+
+if TYPE_CHECKING:
+    from contactopt.scenes.matrix_part import AnyPart
 
 ROUNDED = 1e-12  # of the force: a component that is zero but for rounding
 SLANTED = 1e-3  # cosine between a normal and a direction that lies in the face
@@ -156,7 +159,7 @@ def with_bolts(parts: Sequence[Any], bolts: Sequence[Bolt]) -> tuple[Any, ...]:
         raise InputError(f"bolts must be a tuple of Bolt objects; got {short(bolts)}.")
     ends = [end for i, own in enumerate(bolts, 1) for end in own.ends(parts, f"bolt{i}")]
 
-    def bolted(part: Any) -> Any:
+    def bolted(part: AnyPart) -> AnyPart:
         if not part.meshed:
             return part
         own = tuple(load for load in part.loads if not load.shared)
