@@ -195,8 +195,7 @@ def read_table(path: Path, what: str = "scene file") -> Table:
             said = f"{_again(said, text, line)} is there twice; keep one of them"
         raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
     except (RecursionError, OSError) as error:
-        deep = "its tables and lists are nested too deeply"
-        why = deep if isinstance(error, RecursionError) else error.strerror
+        why = str(getattr(error, "strerror", "its tables and lists are nested too deeply"))
         raise InputError(f"{what} '{path}' cannot be read: {why}.") from error
 
 
