@@ -37,6 +37,7 @@ from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
 from contactopt.scenes.loads import Load
+from contactopt.scenes.loads.bolt import stiff_faces
 from contactopt.scenes.loads.load import Face
 from contactopt.scenes.scene import Part, Scene
 
@@ -355,11 +356,7 @@ class Constraints:
             where = self.unknowns(plate.boundary, component)
             if component in plate.force:
                 if np.any(others[where]):
-                    raise InputError(
-                        f"body '{self.part.name}': the plate on {plate.boundary!r} moves in"
-                        f" {component}, but a support or another plate holds one of its nodes in"
-                        " that component."
-                    )
+                    raise self._held_twice(plate.boundary, component, where[others[where]])
                 self.columns.append(np.zeros(len(self.held)))
                 self.columns[-1][where] = 1.0
                 self.plate_forces.append(plate.force[component])
@@ -372,6 +369,18 @@ class Constraints:
                     f" which holds {component}; drop the plate or the support."
                 )
             self.hold(f"plate '{plate.boundary}'", where)
+
+    def _held_twice(self, boundary: str, component: str, where: np.ndarray) -> InputError:
+        """The error for a plate, or the stiff face of a bolt, that moves what another one holds."""
+        bolts = stiff_faces(self.scene.bolt_ends, self.part.name)
+        own = f"plate '{boundary}'"
+        other = next(n for n, held in self.holders.items() if np.isin(where, held).any())
+        tilt = "let a bolt tilt (tilting = true), or " if own in bolts or other in bolts else ""
+        return InputError(
+            f"body '{self.part.name}': the {bolts.get(own, own)} moves in {component}, but the"
+            f" {bolts.get(other, other) if other != own else 'same face'} holds one of its nodes"
+            f" in that component; {tilt}name faces that share no node."
+        )
 
     def add_all(self) -> Constraints:
         """Those of all supports and plates of the part."""
