@@ -20,6 +20,7 @@ from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.readings.resultants import space_forces
+from contactopt.scenes.scene import Part
 
 # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
 NEAR = 1.5
@@ -152,7 +153,8 @@ def _nodes(reduction: Reduction, name: str, places: np.ndarray) -> dict[str, np.
     (pair,) = (own for own in scene.pairs if own.name == name)
     near = AT * (float(np.ptp(places, axis=1).max(initial=0.0)) or 1.0)
     for part, body in zip(scene.parts, reduction.bodies):
-        if part.name not in pair.bodies or (elements := elements_of(body)) is None:
+        elements = elements_of(body)
+        if part.name not in pair.bodies or elements is None or not isinstance(part, Part):
             continue
         mesh = elements.basis.mesh
         surface = pair.surfaces[pair.bodies.index(part.name)] or part.contact

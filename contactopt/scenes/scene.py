@@ -332,7 +332,7 @@ def _bolts(scene: Scene) -> Listed:
     return Listed(made)
 
 
-Scene.bolts = property(_bolts)  # type: ignore[assignment,misc]
+Scene.bolts = property(_bolts)  # type: ignore[attr-defined]
 
 
 def check_units(units: object) -> None:
