@@ -17,11 +17,10 @@ from contactopt.bodies.elements import Trace, mean_normals
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.bodies.thickness import thin_facets
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve, check_curve
 from contactopt.scenes.scene import Part, Scene
-
-PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +123,7 @@ class AssembledElastic(AssembledBody):
         body, mesh = self.body, self.body.basis.mesh
         x = body.locations
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
-        near = PLANE * float(np.ptp(extent, axis=1).max())
+        near = EQUAL * float(np.ptp(extent, axis=1).max())
         planes = []
         for support in self.part.supports:
             given = support.displacement or {}

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
-from contactopt.bodies.assembled_elastic import PLANE, alone_of, trace_of
+from contactopt.bodies.assembled_elastic import alone_of, trace_of
 from contactopt.bodies.bare_facets import bare_surface, ordered, turned_outwards
 from contactopt.bodies.body import Constraints
 from contactopt.bodies.corners import smooth_tilts
@@ -32,6 +32,7 @@ from contactopt.bodies.matrix_checks import (
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.checks import place_words, real_array
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
 from contactopt.scenes.matrix_part import MatrixPart
@@ -97,7 +98,7 @@ class MatrixBody(AssembledBody):
         """
         body, x = self.body, self.body.locations
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
-        near = PLANE * float(np.ptp(extent, axis=1).max())
+        near = EQUAL * float(np.ptp(extent, axis=1).max())
         still = np.ones(len(body.load), dtype=bool)
         still[body.free] = False
         still, planes = (still & (body.prescribed == 0))[body.unknowns], []

@@ -14,7 +14,8 @@ from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, guided, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import Mortar, contact_normals, mortar
-from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
+from contactopt.coupling.planes_of_symmetry import ContactPoints, symmetry_planes
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.curves import KINK
 from contactopt.scenes.contact import SIDES, Contact
@@ -147,7 +148,7 @@ def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
         plane
         for plane in planes[0]
         for other in planes[1]
-        if np.all(plane.inward == other.inward) and abs(plane.offset - other.offset) <= NEAR * size
+        if np.all(plane.inward == other.inward) and abs(plane.offset - other.offset) <= EQUAL * size
     ]
     if not common:
         return sides

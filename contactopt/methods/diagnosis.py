@@ -20,6 +20,7 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.cards import card, count, line
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.linear.operators import NOISE
 from contactopt.methods.cone import Relaxation
@@ -47,7 +48,6 @@ from contactopt.problem.cones import coulomb_cone
 # a residual of at most the one is a solution, above the other it is none
 CERTIFIED, DISTINCT = 1e-8, 1e-6
 LOOSE = 1e12  # condition above which rounding decides
-SYMMETRIC = 1e-9  # asymmetry below which Q counts as symmetric
 
 
 def _trust(at: Local) -> str:
@@ -146,7 +146,7 @@ class Diagnosis:
         if np.isnan(at.singular):
             return f"{said}; the linear system of these states is singular"
         about = "about " if self.dim == 3 and at.slip else ""
-        if self.asymmetry <= SYMMETRIC:
+        if self.asymmetry <= EQUAL:
             said += (
                 f"; rate of alternating {at.alternating_rate:.3g}, Tresca {at.tresca_rate:.3g} (1"
                 f" at mu = {about}{at.contraction:.3g})"
@@ -197,7 +197,7 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
     counted = values[values > len(values) * np.finfo(float).eps * values.max(initial=0.0)]
     eigenvalues = la.eigvalsh((problem.Q + problem.Q.T) / 2)
     skew = float(np.linalg.norm(problem.Q - problem.Q.T) / (np.linalg.norm(problem.Q) or 1.0))
-    energy = skew <= SYMMETRIC
+    energy = skew <= EQUAL
     unloaded = dimensionless(problem.altered(q=0.0 * problem.q))[0]  # for every load
     guaranteed, uniform, exact = thresholds(unloaded, shape, energy)
     return Diagnosis(

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from contactopt.checks import place_words
+from contactopt.defaults import EQUAL
 from contactopt.linear.operators import form, has_entries
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem, Solution, natural_map_residual
@@ -23,7 +24,6 @@ from contactopt.problem.scaling import immovable
 # Contacts around a place that exchange forces, too: on quadratic elements an exchange falls to a
 # thousandth within three elements.
 NEAREST = 40
-TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
 GENERIC = np.sqrt([1.0, 2.0, 3.0])  # a direction that no lattice of contacts repeats
@@ -67,7 +67,7 @@ def places(problem: InterfaceProblem) -> list[np.ndarray]:
     points = problem.coordinates.T
     if not has_entries(problem.Q) or len(points) != problem.contacts or problem.contacts < 2:
         return []
-    near = TOGETHER * np.ptp(points, axis=0).max()
+    near = EQUAL * np.ptp(points, axis=0).max()
     line = np.sort(points @ GENERIC[: points.shape[1]])  # no two points of a grid fall together
     if np.min(line[1:] - line[:-1]) > GENERIC.sum() * near:
         return []

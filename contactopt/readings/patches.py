@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.chart import ON_PLANE, Chart
+from contactopt.problem.chart import Chart
 from contactopt.readings.constants import RING, ROUNDNESS
 
 # distances that differ by less than this fraction of an element belong to one ring of nodes
 SAME = 1e-5
-CENTRE = 1e-12  # relative change of a patch's edges at which its centre is known
 ROUNDS = 20  # of that iteration, which gains about two digits in each
 
 # rings of nodes next to the edge: how many are left out, how many are fitted
@@ -134,7 +134,7 @@ class Patch:
                 return None
             before, first, last = (first, last), centre - left[0], centre + right[0]
             uncertainty = (left[1] + right[1]) / 2
-            if max(abs(first - before[0]), abs(last - before[1])) <= CENTRE * (last - first):
+            if max(abs(first - before[0]), abs(last - before[1])) <= ROUNDED * (last - first):
                 break
         step = self.step(self.contact, self.place, last)
         return Ends(first, last, self.copies, uncertainty, step)
@@ -207,7 +207,7 @@ def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
     """Whether a patch and its mirror image are one: no contact lies between them but one on the
     plane. (That on an axis of revolution has no area, perhaps no force, and does not divide them.)
     """
-    plane = ON_PLANE * np.abs(place).max()
+    plane = EQUAL * np.abs(place).max()
     off_plane = np.abs(place[np.abs(place) > plane])
     nearest = np.abs(patch).min()
     touches = np.abs(place).min() <= plane
