@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
-from contactopt.bodies.assembled_elastic import alone_of, trace_of
+from contactopt.bodies.assembled import Guides, Mesh, Surface, Work
+from contactopt.bodies.assembled_elastic import AssembledMatrices, alone_of, trace_of
 from contactopt.bodies.bare_facets import bare_surface, ordered, turned_outwards
 from contactopt.bodies.body import Constraints
 from contactopt.bodies.corners import smooth_tilts
@@ -29,7 +29,6 @@ from contactopt.bodies.matrix_checks import (
     numbered,
     without_stiffness,
 )
-from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.checks import place_words, real_array
 from contactopt.defaults import EQUAL
@@ -47,28 +46,18 @@ class _SolvedBody(ElasticBody):
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixBody(AssembledBody):
+class MatrixBody(AssembledMatrices):
     """The matrices of a MatrixPart with their part of the scene."""
 
     body: GivenMatrices
     part: MatrixPart
 
-    @cached_property
-    def name(self) -> str:
-        return self.body.name
-
-    @cached_property
-    def unknowns(self) -> int:
-        return len(self.body.free)
-
-    @cached_property
-    def held(self) -> np.ndarray:
-        return np.setdiff1d(np.arange(len(self.body.load)), self.body.free)
+    @property
+    def surfaces(self) -> Mapping[str, Surface]:
+        return self.body.surfaces
 
     def iterates(self, solver: str) -> bool:
-        if self.body.solves is not None:
-            return False
-        return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
+        return self.body.solves is None and super().iterates(solver)
 
     @cached_property
     def work(self) -> Work:
@@ -82,15 +71,6 @@ class MatrixBody(AssembledBody):
         kept = np.flatnonzero(np.isin(body.unknowns, body.contact_dofs).any(axis=0))
         sizes = (elimination_work(graph, x, own) for own in (kept[:0], kept))
         return Work(body.A.nnz, len(body.contact_dofs), *sizes)
-
-    def surface(self, name: str | None = None) -> Surface:
-        name = name or self.part.contact
-        if name not in self.body.surfaces:
-            raise InputError(
-                f"body '{self.name}' has no contact surface {name!r}; it has"
-                f" {', '.join(sorted(self.body.surfaces))}."
-            )
-        return self.body.surfaces[name]
 
     def guides(self) -> Guides:
         """Coordinate planes, the body on one side, all of whose points are held along the axis, and
