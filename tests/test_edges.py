@@ -6,7 +6,7 @@ import pytest
 from contactopt import InterfaceProblem, Part, Rigid, Scene
 from contactopt.material import Material
 from contactopt.problem.chart import Chart
-from contactopt.readings.edges import contact_edge, contact_zone, stick_edge
+from contactopt.readings.edges import contact_area, contact_edge, contact_zone, stick_edge
 from contactopt.scenes import make_scene
 from contactopt.solving.solve_scene import solve_scene
 
@@ -82,6 +82,28 @@ def test_edges_of_exact_tractions_on_a_surface():
     r = (2.5 / 30) ** 2 * np.stack([p, -0.6 * q, 0.8 * q], axis=1)
     assert contact_edge(scene, problem, r) == pytest.approx(0.987, rel=1e-9)
     assert stick_edge(scene, problem, r)[0] == pytest.approx(0.613, rel=1e-9)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+@pytest.mark.parametrize(
+    "ratio, pressure",
+    [
+        (1.0, lambda s: (1 + 2 * s**2) * np.sqrt(1 - s**2)),  # x^4: no straight line can be fitted
+        (0.7, lambda s: np.sqrt(1 - s**2)),
+        (0.4, lambda s: np.sqrt(1 - s**2)),
+    ],
+)
+def test_an_ellipse_has_the_half_width_of_the_disc_of_its_area(ratio, pressure, turn):
+    grid = np.linspace(-1.25, 1.25, 41)
+    x = np.stack(np.meshgrid(grid, grid)).reshape(2, -1)
+    along = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    s = np.linalg.norm(along @ (x - [[0.013], [0.007]]) / [[1.0], [ratio]], axis=0)
+    areas = np.full(x.shape[1], (2.5 / 40) ** 2)
+    scene, problem = contact(x, "solid", areas)
+    r = np.zeros((x.shape[1], 3))
+    r[:, 0] = areas * np.where(s < 1, pressure(np.minimum(s, 1.0)), 0.0)
+    assert contact_edge(scene, problem, r) == pytest.approx(ratio**0.5, rel=5e-3)
+    assert contact_area(scene, problem, r) == pytest.approx(np.pi * ratio, rel=1e-2)
 
 
 def test_a_surface_of_which_one_corner_is_open_is_no_disc():

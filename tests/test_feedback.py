@@ -3,16 +3,18 @@ with two digits are not called wrong; answers in other units are recognised.
 """
 
 import tomllib
+from dataclasses import replace
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 from test_course import NUMBERS, example
 
-from contactopt import laws
+from contactopt import laws, solve
 from experiments.course.feedback import Displacements, Forces, Open
 from experiments.course.grader import grade, right_answer
-from experiments.course.mistakes import wrong_values
 from experiments.course.quantities import Numbers, by_hand
 from experiments.course.verdict import rounded
 
@@ -104,12 +106,57 @@ def test_every_force_on_a_surface_knows_its_areas():
     assert isinstance(right_answer("4.3").problem.law, laws.Coulomb)
 
 
-def test_a_formula_says_what_was_changed():
-    told = dict(wrong_values("(F - k * g) / 2", {"F": 5.0, "k": 2.0, "g": 1.0}))
-    assert "the sign of `k * g` is wrong" in told[3.5]
-    assert "`k * g` is left out" in told[2.5]
-    assert "multiply by `2`" in told[6.0]
-    assert "division by `2`" in told[3.0]
+# The answer 2 m / (a - k^2 / 2) for m = 3.7, a = 5.3 and k = 1.3; in the chapter k is 1.9.
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        (7.4 / (5.3 + 0.845), "the sign of `k ** 2 / 2` is wrong"),
+        (7.4 / 5.3, "`k ** 2 / 2` is left out"),
+        (7.4 / (5.3 - 1.69), "the division by `2` is left out"),
+        (7.4 * (5.3 - 0.845), "you multiply by `a - k ** 2 / 2`"),
+        (7.4 / (5.3 - 0.65), "the exponent `2` of `k` is left out"),
+        (4.455, "This is `a - k ** 2 / 2`, a step on the way"),
+        (7.4 / (5.3 - 0.5 * 1.9**2), "This has the `k` of the text"),
+        (7.4 / (5.3 - 0.5 / 1.3**2), "`1 / k` takes the part of `k`"),
+        (7.4 / 4.455 * 1.3, "multiplied once more by `k`"),
+        (7.4 / (7.4 + 4.455), "you divide by `2 * m + a - k ** 2 / 2`"),
+        (np.degrees(np.arctan(7.4 / 4.455)), "the angle"),
+        (3.7 - 7.4 / 4.455, "another quantity"),
+        (5.3, "This is `a`"),
+        (5.7 / 4.455, "`2` is added to `m`"),
+    ],
+)
+def test_a_formula_says_what_was_changed(answer, told):
+    given = {"m": 3.7, "a": 5.3, "k": 1.3}
+    right = by_hand(["2 * m / (a - k ** 2 / 2)"], given, chapter={"k": 1.9})
+    assert told in right.verdict(np.array(answer)).sentence
+    assert told in right.verdict(np.array(rounded(answer, 5))).sentence
+
+
+def test_two_terms_that_are_multiplied_one_by_one_and_exponents_outside_a_bracket_are_told():
+    given = {"a": 7.3, "b": 2.1, "c": 5.9, "d": 1.7}
+    one_by_one = by_hand(["(a - b) * (c - d)"], given).verdict(np.array(7.3 * 5.9 - 2.1 * 1.7))
+    assert "multiplied term by term" in one_by_one.sentence
+    outside = by_hand(["a / (1 - d**2)"], given).verdict(np.array(7.3 / 0.7**2))
+    assert "outside a bracket" in outside.sentence
+    halves = by_hand(["a / 2 * b**2 + c / 2 * d**2"], given)
+    assert "all exponents" in halves.verdict(np.array(3.65 * 2.1 + 2.95 * 1.7)).sentence
+
+
+def test_forces_that_belong_to_another_coefficient_order_or_quantity_are_told():
+    right = right_answer("5.7")
+    forces, moved = right.solved
+    other = solve(replace(right.problem, law=laws.Coulomb(0.25))).reactions
+    assert "friction coefficient 0.25" in grade("5.7", other).sentence
+    assert "displacements" in grade("5.7", moved).sentence
+    assert grade("5.7", forces / 2).kind == "half" and grade("4.7", (3.394, 3.606)).kind == "order"
+    assert "forces are asked" not in grade("6.8", right_answer("6.8").solved[0]).sentence
+
+
+@pytest.mark.parametrize("form", [Fraction, Decimal, np.float32, lambda x: [x]])
+def test_numbers_of_every_type_are_numbers_and_digits_that_are_cut_off_are_nearly_right(form):
+    assert grade("2.6", form(1.625)).right
+    assert "three digits" in grade("2.8", -0.430).sentence  # -0.43077
 
 
 def test_a_value_that_a_mistake_cannot_give_is_told_by_its_bounds_or_its_size():

@@ -16,8 +16,9 @@ Divided by the nodal area, it is the traction where that function has its centro
 of linear elements this is beside the node, by a share of the element size.
 
 A zone is read at each of its ends (contactopt.readings.patches), wherever it lies on the contact
-surface. Its half-width is that of the strip, or the radius of the disc, with the same area. Where
-an end cannot be read, the nodal areas are counted.
+surface. Its half-width is that of the strip, or the radius of the disc, with the same area; of a
+zone nearer to a rectangle than to an ellipse, half of the side of the square with the same area.
+Where an end cannot be read, the nodal areas are counted.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ from contactopt.readings.constants import (
     STEPS,
     WITHIN,
 )
-from contactopt.readings.patches import End, patches_of
+from contactopt.readings.patches import End, is_round, patches_of
 from contactopt.readings.peaks import Peak, Reading, neighbours
 from contactopt.scenes.scene import Scene
 
@@ -60,10 +61,10 @@ def contact_area(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
     """The area on which one pair of surfaces touches, with all mirror images, around the axis or
     over the thickness [length^2]: of the zone whose half-width is read, or of the nodes that touch.
     """
-    counted = float(problem.areas[contact_status(problem, reactions).touching].sum())
+    touching = contact_status(problem, reactions).touching
+    counted = float(problem.areas[touching].sum())
     width = contact_edge(scene, problem, reactions)
-    nodal = width == scene.analysis.half_width(counted, scene.thickness)
-    if nodal or _is_ring(scene, problem):
+    if width == _counted(scene, problem, touching) or _is_ring(scene, problem):
         return counted
     return (
         float(np.pi * width**2) if scene.dim == 3 else scene.analysis.area(width, scene.thickness)
@@ -194,8 +195,7 @@ def _half_width(
     """Half-width of the zone `inside`, from the readings of its ends, and its uncertainty, at least
     `least` elements. `weights` (k,) average the centre of a zone on a surface.
     """
-    area = float(problem.areas[inside].sum())
-    counted = scene.analysis.half_width(area, scene.thickness)
+    area, counted = float(problem.areas[inside].sum()), _counted(scene, problem, inside)
     if ring := _is_ring(scene, problem):  # half of the width of the ring, along its section
         around = 2 * np.pi * np.abs(problem.coordinates[0])
         counted = float((problem.areas / around)[inside].sum()) / 2
@@ -216,6 +216,14 @@ def _half_width(
         squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
+
+
+def _counted(scene: Scene, problem: InterfaceProblem, inside: np.ndarray) -> float:
+    """The half-width of a zone [length] by its nodal areas alone."""
+    area = float(problem.areas[inside].sum())
+    if problem.dim == 3 and inside.any() and is_round(problem, inside):
+        return float(np.sqrt(area / np.pi))
+    return scene.analysis.half_width(area, scene.thickness)
 
 
 def _at_centroids(end: End, scene: Scene) -> End:

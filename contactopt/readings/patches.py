@@ -2,7 +2,8 @@
 
 On a contact line a patch is a run of neighbouring contacts, in general position: off the origin of
 the chart, reaching the end of the surface, across the seam of a closed curve. On a surface it is a
-disc about its centre, seen as one end.
+disc about its centre, seen as one end, or an ellipse: lengths along its axes are scaled so that it
+becomes the disc of the same area.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from contactopt.readings.constants import RING, ROUNDNESS
 
 # distances that differ by less than this fraction of an element belong to one ring of nodes
 SAME = 1e-5
+# between 1, of a disc, and 1.25, of a square: the farthest point over that of a disc
+FARTHEST = 1.12
 ROUNDS = 20  # of that iteration, which gains about two digits in each
 
 # rings of nodes next to the edge: how many are left out, how many are fitted
@@ -106,6 +109,7 @@ class Patch:
               disc
     copies    how many images of the patch make the whole zone
     chart     of all contacts, from which the distance of neighbours is taken
+    stretch   by how much distances grow at most where an ellipse becomes a disc
     """
 
     contact: np.ndarray
@@ -114,6 +118,7 @@ class Patch:
     centred: bool
     copies: int
     chart: Chart
+    stretch: float = 1.0
 
     def measure(self, read: Callable[[End], tuple[float, float] | None]) -> Ends | None:
         """The ends of the patch from the readings of each; None where one cannot be read. Readings
@@ -160,10 +165,11 @@ class Patch:
         """Distance between neighbouring contacts next to an edge at that distance [length]."""
         points, grid = self.chart.places, self.chart.grid
         if grid is not None:
-            return float(np.min(np.ptp(points, axis=1) / (np.array(grid) - 1)))
+            return self.stretch * float(np.min(np.ptp(points, axis=1) / (np.array(grid) - 1)))
         near = contact[least(np.abs(distance - edge), 5)]
         squares = [np.sum((points - points[:, [i]]) ** 2, axis=0) for i in near]
-        return float(np.sqrt(np.median([np.partition(apart, 1)[1] for apart in squares])))
+        found = np.sqrt(np.median([np.partition(apart, 1)[1] for apart in squares]))
+        return self.stretch * float(found)
 
 
 def least(values: np.ndarray, count: int) -> np.ndarray:
@@ -225,15 +231,52 @@ def _longest_run(mask: np.ndarray) -> int:
 
 
 def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> Patch | None:
-    """The contacts inside as a disc about their centre of gravity; None where they are no disc."""
-    x = problem.chart.places
-    centre = (x[:, inside] @ weights[inside]) / weights[inside].sum()
-    centre = np.where(problem.chart.mirrored, 0.0, centre)
-    distance = np.linalg.norm(x - centre[:, None], axis=0)
-    disc = Patch(np.arange(problem.contacts), distance, inside, True, 1, problem.chart)
-    step = disc.step(disc.contact, distance, float(distance[inside].max()))
-    apart = abs(distance[~inside].min() - distance[inside].max())
-    return disc if apart <= ROUNDNESS * step else None
+    """The contacts inside as a disc about their centre of gravity, or as an ellipse that becomes
+    one; None where they are neither.
+    """
+    x = _from_centre(problem, inside, weights)
+    for scaled, stretch in ((x, 1.0), _as_disc(problem, x, inside, weights)):
+        distance = np.linalg.norm(scaled, axis=0)
+        contact = np.arange(problem.contacts)
+        disc = Patch(contact, distance, inside, True, 1, problem.chart, stretch)
+        step = disc.step(contact, distance, float(distance[inside].max()))
+        if abs(distance[~inside].min() - distance[inside].max()) <= ROUNDNESS * step:
+            return disc
+    return None
+
+
+def is_round(problem: InterfaceProblem, inside: np.ndarray) -> bool:
+    """Whether a zone on a surface is nearer to an ellipse than to a rectangle: scaled to equal
+    axes, the first reaches as far as the disc of its area, the second 1.25 times as far.
+    """
+    areas = problem.areas
+    x = _from_centre(problem, inside, areas)
+    scaled, _ = _as_disc(problem, x, inside, areas)
+    disc = np.sqrt(areas[inside].sum() / np.pi)
+    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= FARTHEST * disc)
+
+
+def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(2, k) places from the centre of gravity of a zone, which planes of symmetry hold."""
+    x, w = problem.chart.places, weights[inside]
+    centre = np.where(problem.chart.mirrored, 0.0, x[:, inside] @ w / w.sum())
+    return np.asarray(x - centre[:, None])
+
+
+def _as_disc(
+    problem: InterfaceProblem, x: np.ndarray, inside: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Places (2, k) scaled, without a change of areas, so that the second moments of the zone are
+    those of a disc, and the largest factor.
+    """
+    moments = (x[:, inside] * weights[inside]) @ x[:, inside].T
+    if any(problem.chart.mirrored):
+        moments = np.diag(np.diag(moments))
+    values, axes = np.linalg.eigh(moments)
+    if values[0] <= ROUNDED * values[1]:
+        return x, 1.0
+    factors = (values[0] * values[1]) ** 0.25 / np.sqrt(values)
+    return np.asarray(axes * factors @ axes.T @ x), float(factors[0])
 
 
 def _rings(depth: np.ndarray, step: float, count: int) -> list[float]:

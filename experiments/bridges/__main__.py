@@ -34,6 +34,7 @@ BRIDGES = {
     "ngsolve_block": ("NGSolve", "ngsolve"),
     "getfem_block": ("GetFEM", "getfem"),
     "kratos_block": ("Kratos", "KratosMultiphysics.StructuralMechanicsApplication"),
+    "dolfinx_block": ("FEniCSx", "dolfinx.fem.petsc"),
 }
 
 

@@ -110,7 +110,11 @@ GRADED = {
         ),
     ),
     "3.5": (
-        lambda: Numbers(sweep(), least=(0.0, "The floor only pushes: no force is negative.")),
+        lambda: Numbers(
+            sweep(),
+            given={"weight": f / 4},
+            least=(0.0, "The floor only pushes: no force is negative."),
+        ),
         (lambda: sweep(True), "This is Jacobi: each node must see the new force of the last one."),
         (lambda: sweep(sweeps=200), "This is the solution. One sweep does not reach it."),
         (lambda: sweep(sweeps=2), "This is the result of two sweeps."),
@@ -131,7 +135,11 @@ GRADED = {
     "3.10": (
         lambda: Numbers(
             float(np.linalg.cond(middle_spring())),
-            given={"k_p": 700.0, "N": 4.0},
+            given={
+                "k_p": 700.0,
+                "largest eigenvalue": float(np.linalg.eigvalsh(middle_spring())[-1]),
+                "smallest eigenvalue": float(np.linalg.eigvalsh(middle_spring())[0]),
+            },
             least=(1.0, "A condition number is at least one."),
         ),
         (lambda: np.linalg.cond(middle_spring(0.0)), "This is A alone: the spring is missing."),

@@ -92,12 +92,13 @@ GRADED = {
         (lambda: forces_of(0.0), "frictionless"),
         (lambda: forces_of(laws.Associated(0.1)), "associated"),
         (lambda: forces_of(0.1) * [1, -1], "along"),
-        (lambda: forces_of(0.2), "bound"),
+        (lambda: forces_of(0.2), "coefficient"),
         (lambda: forces_of(0.1) / rough().areas[:, None], "pressure"),
     ),
     "4.4": (
         lambda: Numbers(
             float(stiffest()[-1]),
+            given={"gamma_0 of the text": 10.0, "E": E},
             least=(0.0, "gamma_0 is positive: only a positive gamma pushes."),
         ),
         (lambda: stiffest()[-1] * E * 8, "This is gamma = gamma_0 E / h. Give gamma_0."),

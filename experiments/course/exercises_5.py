@@ -57,7 +57,7 @@ def slides(motion: np.ndarray) -> str | None:
 
 GRADED = {
     "5.3": (
-        lambda: (slipping(0.2), slipping(0.1)),
+        lambda: Numbers((slipping(0.2), slipping(0.1)), given={"nodes": 25.0}),
         (lambda: (slipping(0.1), slipping(0.2)), "order"),
         (lambda: (25 - slipping(0.2), 25 - slipping(0.1)), "These are the nodes that stick."),
         (lambda: (slipping(0.2),) * 2, "`newton` reads mu and the problem: change both for 0.1."),
@@ -88,7 +88,7 @@ GRADED = {
         (lambda: forces_of("associated"), "associated"),
         (lambda: forces_of(0.35) * [1, -1], "along"),
         (lambda: 0.98 * forces_of(0.35), "balance"),
-        (lambda: forces_of(0.5), "bound"),
+        (lambda: forces_of(0.5), "coefficient"),
         (lambda: forces_of(0.35) / punch().areas[:, None], "pressure"),
     ),
     "5.8": (lambda: Open((0.27, 1.0), slides),),

@@ -9,6 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from decimal import Decimal
+from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,9 +19,10 @@ import numpy as np
 from contactopt import InterfaceProblem, laws, natural_map_residual, solve
 from contactopt.problem.certificate import Yardsticks, fit_multipliers, yardsticks
 from experiments.course.quantities import Numbers
-from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, wrong
+from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, shortened, wrong
 
 HUGE = 1e100  # from here on numbers count as infinite
+REAL = (int, float, np.integer, np.floating, Fraction, Decimal)  # types of numbers
 TOLD = 0.2  # a condition is told first if its violation is this share of the largest one
 
 
@@ -41,13 +45,33 @@ class Forces:
             return np.column_stack([answer.ravel(), np.zeros((k, dim - 1))])
         return answer.reshape(k, dim)
 
+    @cached_property
+    def solved(self) -> tuple[np.ndarray, np.ndarray]:
+        """Forces and displacements, from contactopt."""
+        found = solve(self.problem, tol=1e-10)
+        moved = self.problem.displacements(found.reactions, found.multipliers)
+        return found.reactions, moved
+
     def solution(self) -> np.ndarray:
-        """The right answer, from contactopt."""
-        return solve(self.problem, tol=1e-10).reactions
+        """The right answer."""
+        return self.solved[0]
 
     def verdict(self, answer: np.ndarray) -> Verdict:
         found = judge_forces(self.problem, self.forces(answer))
-        return found if found.right else self._digits(answer) or self._unit(answer) or found
+        if found.right:
+            return found
+        return self._digits(answer) or self._unit(answer) or self._other(answer) or found
+
+    def other(self) -> tuple[np.ndarray, str]:
+        """What somebody gives who confuses forces and displacements, and what is told."""
+        return self.solved[1], "These are the displacements. The forces are asked for."
+
+    def _other(self, answer: np.ndarray) -> Verdict | None:
+        other, told = self.other()
+        other = other if answer.size == other.size else other[:, :1]
+        least = CLOSE * np.abs(other).max()
+        same = other.any() and np.allclose(answer.ravel(), other.ravel(), rtol=CLOSE, atol=least)
+        return wrong("quantity", told) if same else None
 
     def _digits(self, answer: np.ndarray) -> Verdict | None:
         """Whether an answer is the right one with three digits, or with fewer."""
@@ -56,11 +80,11 @@ class Forces:
             right = right[:, :1]
         pairs = list(zip(answer.ravel(), right.ravel(), strict=True))
         least = CLOSE * np.abs(right).max()
-        for digits, verdict in ((3, RIGHT), (2, DIGITS)):
-            # numbers as given, or all with the same decimal place
+        for digits, ways, verdict in ((3, 1, RIGHT), (3, 2, DIGITS), (2, 2, DIGITS)):
+            # numbers as given, rounded or cut off, or all with the same decimal place
             decimals = digits - 1 - int(np.floor(np.log10(np.abs(right).max())))
             if all(
-                np.isclose(a, rounded(b, digits), rtol=1e-9, atol=least)
+                np.isclose(a, shortened(b, digits)[:ways], rtol=1e-9, atol=least).any()
                 or np.isclose(a, round(b, decimals), rtol=1e-9, atol=1e-12)
                 for a, b in pairs
             ):
@@ -84,12 +108,14 @@ class Displacements(Forces):
         return np.linalg.solve(self.problem.Q, (u - self.problem.q).ravel()).reshape(u.shape)
 
     def solution(self) -> np.ndarray:
-        found = solve(self.problem, tol=1e-10)
-        return self.problem.displacements(found.reactions, found.multipliers)
+        return self.solved[1]
+
+    def other(self) -> tuple[np.ndarray, str]:
+        return self.solved[0], "These are the forces. The displacements are asked for."
 
     def verdict(self, answer: np.ndarray) -> Verdict:
         found = super().verdict(answer)
-        if found.right or found.kind in ("unit", "digits"):
+        if found.right or found.kind in ("unit", "digits", "quantity"):
             return found
         about = "Your displacements need the forces r = K (u - q). With them: "
         return replace(found, sentence=found.sentence.replace("yet. ", f"yet. {about}", 1))
@@ -159,8 +185,11 @@ def as_numbers(answer: Any, right: Right, asks: str) -> np.ndarray | Verdict:
         return wrong("type", f"A part of a cvxpy program has its number in `.value`. {wanted}")
     try:
         given = np.asarray(answer)
-        if given.dtype.kind not in "iuf":
+        if any(
+            isinstance(one, (bool, np.bool_)) or not isinstance(one, REAL) for one in given.flat
+        ):
             raise TypeError
+        given = given.astype(float)
     except (TypeError, ValueError):
         return wrong(
             "type", f"Your answer has the type {type(answer).__name__}, and is no number. {wanted}"
@@ -170,7 +199,7 @@ def as_numbers(answer: Any, right: Right, asks: str) -> np.ndarray | Verdict:
     flat = np.squeeze(given).shape
     for shape in right.shapes:
         if given.shape == shape or flat == tuple(n for n in shape if n > 1):
-            return given.astype(float).reshape(shape)
+            return given.reshape(shape)
     return wrong("shape", f"Your answer holds {_size(given.shape)}. {wanted}")
 
 
@@ -207,8 +236,19 @@ def _others(problem: InterfaceProblem, r: np.ndarray) -> list[tuple[str, Any, np
             " against it.",
         ),
         ("pressure", problem, r * areas, "These are forces per area; forces are asked for."),
+        ("half", problem, 2 * r, "A factor of two is missing, or one too many."),
+        ("half", problem, r / 2, "A factor of two is missing, or one too many."),
+        ("order", problem, r[::-1], "These are the right forces in the reverse order."),
     ]
+    if problem.dim == 3:
+        told = "The two tangential directions are exchanged."
+        found.append(("order", problem, r[:, [0, 2, 1]], told))
     if isinstance(problem.law, laws.Coulomb) and problem.law.rough.any():
+        pushes = r[:, 0] > CLOSE * np.abs(r).max()
+        if np.sum(pushes) > 2 and r[:, 1:].any():
+            mu = float(np.max(np.linalg.norm(r[pushes, 1:], axis=1) / r[pushes, 0]))
+            told = f"These forces belong to the friction coefficient {mu:.3g}."
+            found.append(("coefficient", _with_law(problem, laws.Coulomb(mu)), r, told))
         found += [
             (
                 "associated",

@@ -45,7 +45,8 @@ class Exercise:
     solution  lines that a student can run in the chapter; they end with the answer
     formulas  of the numbers of the answer, in the quantities that are given, from which mistakes
               are made; close is the relative error that counts as right, least and most are bounds
-              that mechanics gives, each with its reason
+              that mechanics gives, each with its reason; chapter_text has the numbers of the same
+              quantities in the text of the chapter
     """
 
     number: str
@@ -60,6 +61,7 @@ class Exercise:
     close: float = CLOSE
     least: tuple[float, str] | None = None
     most: tuple[float, str] | None = None
+    chapter_text: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass
@@ -78,12 +80,15 @@ PROGRESS: dict[str, Progress] = {}
 def exercises(chapter: int) -> dict[str, Exercise]:
     """The exercises of a chapter by their numbers."""
     texts = tomllib.loads((FOLDER / f"exercises_{chapter}.toml").read_text(encoding="utf-8"))
+    chapter_text = texts.pop("text", {})
     graded = import_module(f"experiments.course.exercises_{chapter}").GRADED
     found = {}
     for number, text in texts.items():
         right, *computed = graded.get(number, (None,))
         told = [(wrong_value(one, text), words) for one, words in text.pop("mistakes", ())]
-        found[number] = Exercise(number, right, (*told, *computed), **text)
+        found[number] = Exercise(
+            number, right, (*told, *computed), **text, chapter_text=chapter_text
+        )
     return found
 
 
@@ -108,7 +113,9 @@ def right_answer(number: str) -> Right:
     """The right answer as a kind of `feedback`; it is computed once."""
     task = exercise(number)
     if task.right is None:
-        return by_hand(task.formulas, task.given, task.close, task.least, task.most)
+        return by_hand(
+            task.formulas, task.given, task.close, task.least, task.most, task.chapter_text
+        )
     found = task.right()
     plain = isinstance(found, (int, float, tuple, list, np.ndarray))
     return Numbers(found) if plain else found

@@ -2,17 +2,23 @@
 
 A formula is an expression of Python in the quantities that an exercise gives. Every single change of
 it is a mistake that somebody makes: a term with the wrong sign, a factor that is forgotten, a
-division the wrong way round, a root or an exponent that is missing, one quantity in place of another.
+division the wrong way round, a root or an exponent that is missing, one quantity in place of another,
+a stiffness in place of a compliance, the number of the chapter in place of that of the exercise, or
+a step on the way in place of the answer.
 """
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from copy import deepcopy
 from functools import cache
-from itertools import permutations, product
+from itertools import combinations, product
+from math import isclose
 
 import numpy as np
+
+from experiments.course.verdict import rounded
 
 NAMES = {
     name: getattr(np, name)
@@ -39,15 +45,24 @@ OTHERS = {
     "tan": "sin",
 }
 # pairs of changes and products of powers are tried up to here; more would match by chance
-MOST_CHANGES, MOST_QUANTITIES, EXACT = 60, 7, 1e-6
+MOST_CHANGES, MOST_QUANTITIES = 60, 7
+# an answer fits to a number by chance unless it gives so many digits
+ENOUGH_DIGITS = 4
+ANOTHER = "This is `{}`: that is another quantity."
+# changes that somebody makes less often than others, which explain an answer last
+SELDOM = ("is squared", "another exponent", "under a square root", "takes the place")
 EXPONENTS = (0.5, 1 / 3, 2 / 3, 2.0, 3.0)
-# what a whole answer may be multiplied by, and what this means
-FACTORS = (
-    (-1.0, "Besides, the sign is wrong."),
-    (2.0, "Besides, it is twice as large."),
-    (0.5, "Besides, it is half as large."),
-    (1e3, "Besides, look at the units."),
-    (1e-3, "Besides, look at the units."),
+# what may be done besides to the number that a mistake gives
+BESIDES: tuple[tuple[Callable[[float], float], str], ...] = (
+    (lambda x: -x, "Besides, the sign is wrong."),
+    (lambda x: 2 * x, "Besides, it is twice as large."),
+    (lambda x: x / 2, "Besides, it is half as large."),
+    (lambda x: 1e3 * x, "Besides, look at the units."),
+    (lambda x: x / 1e3, "Besides, look at the units."),
+    (lambda x: 1 / x, "Besides, it is one over that."),
+    (lambda x: 1 - x, "Besides, it is one minus that."),
+    (lambda x: x * x, "Besides, it is squared."),
+    (lambda x: abs(x) ** 0.5, "Besides, it is under a square root."),
 )
 
 
@@ -62,25 +77,109 @@ def _value(node: ast.expr, given: dict[str, float]) -> float:
         return float(eval(code, {"__builtins__": {}}, NAMES | given))
 
 
-def wrong_values(formula: str, given: dict[str, float]) -> list[tuple[float, str]]:
-    """Numbers that a single mistake gives, each with the mistake in words."""
-    return list(_wrong_values(formula, tuple(given.items())))
+Given = tuple[tuple[str, float], ...]
+Found = tuple[tuple[float, str], ...]
 
 
 @cache
-def _wrong_values(
-    formula: str, given: tuple[tuple[str, float], ...]
-) -> tuple[tuple[float, str], ...]:
-    quantities, found = dict(given), []
-    right = value(formula, quantities)
-    for node, words in changed(ast.parse(formula, mode="eval").body, quantities):
+def wrong_values(formula: str, given: Given, chapter: Given = ()) -> Found:
+    """Numbers that a single mistake gives, each with the mistake in words, the likely ones first.
+
+    chapter  the numbers that the quantities have in the text of the chapter
+    """
+    known, tree = dict(given), ast.parse(formula, mode="eval").body
+    inside = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    tried = [(node, known, f"This comes out if {words}.") for node, words in changed(tree, known)]
+    tried.sort(key=lambda one: max(SELDOM.index(w) + 1 if w in one[2] else 0 for w in SELDOM))
+    seldom = sum(any(w in words for w in SELDOM) for _, _, words in tried)
+    between = [
+        (node, known, words) for node, words in (*_everywhere(tree), *_once_more(tree, known))
+    ]
+    between += [
+        (tree, known | other, words) for other, words in _misread(known, dict(chapter), inside)
+    ]
+    steps = [(node, f"This is `{ast.unparse(node)}`, a step on the way.") for node in _steps(tree)]
+    between += [(node, known, words) for node, words in steps]
+    tried[len(tried) - seldom : len(tried) - seldom] = between
+    found: dict[float, tuple[float, str]] = {}  # by ten digits: the likeliest words stay
+    right = value(formula, known)
+    for node, quantities, words in tried:
         try:
             number = _value(node, quantities)
         except (ArithmeticError, ValueError, TypeError):
             continue
         if np.isfinite(number) and not np.isclose(number, right, rtol=1e-9):
-            found.append((number, f"This comes out if {words}."))
-    return tuple(found)
+            found.setdefault(rounded(number, 10), (number, words))
+    return tuple(found.values())
+
+
+def _steps(tree: ast.expr) -> list[ast.expr]:
+    """The parts of a formula that hold a quantity and are more than that, the largest first."""
+    return [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.BinOp, ast.Call))
+        and node is not tree
+        and any(isinstance(one, ast.Name) and one.id not in NAMES for one in ast.walk(node))
+    ]
+
+
+class _Without(ast.NodeTransformer):
+    """Leaves an operation with a constant out wherever it stands: all squares, or all halves."""
+
+    def __init__(self, op: type[ast.operator]) -> None:
+        self.op = op
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        gone = isinstance(node.op, self.op) and isinstance(node.right, ast.Constant)
+        return node.left if gone else node
+
+
+def _everywhere(tree: ast.expr) -> Iterator[tuple[ast.expr, str]]:
+    for op, told in ((ast.Pow, "exponents"), (ast.Div, "divisions by a number")):
+        yield _Without(op).visit(deepcopy(tree)), f"This comes out if all {told} are left out."
+
+
+def _once_more(tree: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr, str]]:
+    """The right answer times a quantity, or over it."""
+    for name in given if len(given) <= MOST_QUANTITIES else ():
+        for op, done in ((ast.Mult(), "multiplied"), (ast.Div(), "divided")):
+            node = tree
+            for times in ("once", "twice"):
+                node = ast.BinOp(node, op, ast.Name(name, ast.Load()))
+                yield node, f"This is the right answer, {done} {times} more by `{name}`."
+
+
+def _misread(
+    given: dict[str, float], chapter: dict[str, float], inside: set[str]
+) -> Iterator[tuple[dict[str, float], str]]:
+    """Quantities inside a formula that are mistaken wherever they stand, and the mistake in words."""
+    given = {name: number for name, number in given.items() if name in inside}
+    for name, number in given.items():
+        yield {name: -number}, f"This comes out if the sign of `{name}` is wrong."
+        yield {name: 0.0}, f"This comes out without `{name}`."
+        yield {name: 1.0}, f"This comes out without `{name}`."
+        if number:
+            yield {name: 1 / number}, f"This comes out if `1 / {name}` takes the part of `{name}`."
+    old = {name: number for name, number in chapter.items() if name in given}
+    for names in (*((name,) for name in old), tuple(old)):
+        told = " and ".join(f"`{name}`" for name in names)
+        yield (
+            {name: old[name] for name in names},
+            f"This has the {told} of the text. The exercise gives another number.",
+        )
+    for (first, a), (second, b) in combinations(given.items(), 2):
+        yield {first: b, second: a}, f"This comes out if `{first}` and `{second}` are exchanged."
+
+
+def fits(answer: float, number: float) -> bool:
+    """Whether an answer is a number to all its digits, which are too many for a coincidence."""
+    if not isclose(answer, number, rel_tol=0.6 * 10 ** (1 - ENOUGH_DIGITS)):
+        return False  # quickly: most numbers are far away
+    digits = len(f"{abs(answer):.12e}".split("e")[0].replace(".", "").rstrip("0"))
+    exact = isclose(answer, number, rel_tol=1e-9)
+    return exact or (digits >= ENOUGH_DIGITS and answer == rounded(number, digits))
 
 
 def changed(node: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr, str]]:
@@ -111,10 +210,10 @@ def changed(node: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr,
             squared = ast.BinOp(node, ast.Pow(), ast.Constant(2.0))
             yield squared, f"`{name}` is squared"
             yield ast.BinOp(node, ast.Pow(), ast.Constant(0.5)), f"`{name}` is under a square root"
-            for other in given:
-                if given[other] != given[name]:
-                    told = f"`{other}` takes the place of `{name}`"
-                    yield ast.Name(other, ast.Load()), told
+            for second, number in given.items():
+                if number != given[name]:
+                    told = f"`{second}` takes the place of `{name}`"
+                    yield ast.Name(second, ast.Load()), told
 
 
 def _changed_operation(
@@ -127,15 +226,26 @@ def _changed_operation(
             yield ast.BinOp(left, flipped, right), f"the sign of `{second}` is wrong"
             yield left, f"`{second}` is left out"
             yield right, f"`{first}` is left out"
+            if isinstance(right, ast.BinOp) and isinstance(right.op, ast.Pow):
+                whole = ast.BinOp(ast.BinOp(left, op, right.left), right.op, right.right)
+                yield whole, f"the exponent of `{ast.unparse(right.left)}` stands outside a bracket"
         case ast.Mult():
             yield left, f"the factor `{second}` is left out"
             yield right, f"the factor `{first}` is left out"
             yield ast.BinOp(left, ast.Div(), right), f"you divide by `{second}`: multiply by it"
             yield ast.BinOp(right, ast.Div(), left), f"you divide by `{first}`: multiply by it"
+            yield ast.BinOp(left, ast.Add(), right), f"`{first}` is added to `{second}`: multiply"
+            match left, right:
+                case ast.BinOp(a, ast.Add() | ast.Sub(), b), ast.BinOp(c, ast.Add() | ast.Sub(), d):
+                    terms = ast.BinOp(a, ast.Mult(), c), ast.BinOp(b, ast.Mult(), d)
+                    told = f"`{first}` and `{second}` are multiplied term by term"
+                    yield ast.BinOp(terms[0], left.op, terms[1]), told
         case ast.Div():
             yield left, f"the division by `{second}` is left out"
             yield ast.BinOp(left, ast.Mult(), right), f"you multiply by `{second}`: divide by it"
             yield ast.BinOp(right, ast.Div(), left), f"`{first}` and `{second}` are exchanged"
+            both = ast.BinOp(left, ast.Add(), right)
+            yield ast.BinOp(left, op, both), f"you divide by `{first} + {second}`"
         case ast.Pow():
             yield left, f"the exponent `{second}` of `{first}` is left out"
             for exponent in EXPONENTS:
@@ -144,14 +254,16 @@ def _changed_operation(
 
 
 @cache
-def two_mistakes(
-    formula: str, given: tuple[tuple[str, float], ...]
-) -> tuple[tuple[float, str], ...]:
-    """Numbers that two mistakes give; of long formulas there are too many."""
+def two_mistakes(formula: str, given: Given) -> Found:
+    """Numbers that two likely mistakes give; of long formulas there are too many."""
     quantities, found = dict(given), []
-    once = list(changed(ast.parse(formula, mode="eval").body, quantities))
+
+    def likely(node: ast.expr) -> list[tuple[ast.expr, str]]:
+        return [one for one in changed(node, quantities) if not any(w in one[1] for w in SELDOM)]
+
+    once = likely(ast.parse(formula, mode="eval").body)
     for node, first in once if len(once) <= MOST_CHANGES else ():
-        for other, second in changed(node, quantities):
+        for other, second in likely(node):
             try:
                 number = _value(other, quantities)
             except (ArithmeticError, ValueError, TypeError):
@@ -161,22 +273,36 @@ def two_mistakes(
     return tuple(found)
 
 
-def quantity(answer: float, given: dict[str, float], close: float) -> str | None:
-    """What an answer is if it is made of the given quantities: one of them, a sum, a difference, or
+@cache
+def _sums(formula: str, given: Given) -> Found:
+    """Sums and differences of a quantity and a quantity, a step of the formula or its value."""
+    known, tree = dict(given), ast.parse(formula, mode="eval").body
+    parts = dict(known)
+    for node in (tree, *_steps(tree)):
+        parts[ast.unparse(node)] = _value(node, known)
+    found = []
+    for (first, a), (second, b) in product(known.items(), parts.items()):
+        if first != second:
+            found += [(a + b, ANOTHER.format(f"{first} + {second}"))]
+            found += [(a - b, ANOTHER.format(f"{first} - {second}"))]
+            found += [(b - a, ANOTHER.format(f"{second} - {first}"))]
+    return tuple(found)
+
+
+def quantity(answer: float, given: dict[str, float], formula: str) -> str | None:
+    """What is told of an answer that is made of the given quantities: a sum, a difference, or
     a product of powers with a simple factor.
     """
     known = {name: number for name, number in given.items() if number}
-    for (first, a), (second, b) in permutations(known.items(), 2):
-        for number, name in ((a + b, f"{first} + {second}"), (a - b, f"{first} - {second}")):
-            if np.isclose(answer, number, rtol=close, atol=0):
-                return name
     if not known or len(known) > MOST_QUANTITIES:
         return None
+    for number, told in _sums(formula, tuple(known.items())):
+        if fits(answer, number):
+            return told
     exponents = (0, 1, -1, 2, -2) if len(known) <= 4 else (0, 1, -1)
     powers = np.array(list(product(exponents, repeat=len(known))))
     powers = powers[np.argsort(abs(powers).sum(axis=1), kind="stable")]
     numbers = np.prod(np.array(list(known.values())) ** powers.astype(float), axis=1)
-    short = abs(powers).sum(axis=1) <= 2  # more of them come out by chance
     for factor, name in (
         (1.0, ""),
         (2.0, "2 * "),
@@ -184,12 +310,13 @@ def quantity(answer: float, given: dict[str, float], close: float) -> str | None
         (4.0, "4 * "),
         (0.25, "0.25 * "),
     ):
-        near = np.where(short & (factor == 1), close, EXACT)
-        for k in np.flatnonzero(abs(factor * numbers - answer) <= near * abs(answer))[:1]:
-            parts = [
-                one if power == 1 else f"{one}**{power}"
-                for one, power in zip(known, powers[k], strict=True)
-                if power
-            ]
-            return name + " * ".join(parts or ["1"])
+        near = np.flatnonzero(np.isclose(factor * numbers, answer, rtol=1e-3, atol=0))
+        for k in near:
+            if fits(answer, factor * numbers[k]):
+                parts = [
+                    one if power == 1 else f"{one}**{power}"
+                    for one, power in zip(known, powers[k], strict=True)
+                    if power
+                ]
+                return ANOTHER.format(name + " * ".join(parts or ["1"]))
     return None

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import permutations
+from math import isclose
 from typing import Any
 
 import numpy as np
 
 from experiments.course.mistakes import (
-    EXACT,
-    FACTORS,
+    ANOTHER,
+    BESIDES,
+    fits,
     quantity,
     two_mistakes,
     value,
     wrong_values,
 )
-from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, wrong
+from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, shortened, wrong
 
 UNITS = (1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)
 # factors that no formula shows
@@ -36,6 +38,28 @@ LOST = (
     (0.01, "The decimal point is in a wrong place."),
     (180 / np.pi, "Radians and degrees are mixed up."),
     (np.pi / 180, "Radians and degrees are mixed up."),
+    (3.0, "A factor of three is missing, or one too many."),
+    (1 / 3, "A factor of three is missing, or one too many."),
+    (np.sqrt(2), "A factor of the square root of two is missing, or one too many."),
+    (np.sqrt(0.5), "A factor of the square root of two is missing, or one too many."),
+)
+# functions of the right answer that somebody gives in its place
+ANGLE = "This is the angle, and its tangent is asked for."
+RELATED: tuple[tuple[Callable[[float], float], str], ...] = (
+    (lambda x: 1 / x, "This is one over the right answer."),
+    (lambda x: -1 / x, "This is one over the right answer, with the wrong sign."),
+    (lambda x: 2 / x, "This is twice one over the right answer."),
+    (lambda x: 0.5 / x, "This is half of one over the right answer."),
+    (lambda x: x**2, "A square root is missing. Look at the exponents."),
+    (np.sqrt, "A square is missing. Look at the exponents."),
+    (lambda x: 1 - x, "This is one minus the right answer."),
+    (lambda x: x - 1, "This is the right answer minus one: a change, and not a ratio."),
+    (lambda x: np.degrees(np.arctan(x)), ANGLE),
+    (np.arctan, ANGLE),
+    (lambda x: np.sin(np.arctan(x)), "This is the sine of the angle whose tangent is asked for."),
+    (np.log10, "This is the logarithm of the right answer."),
+    (np.log, "This is the logarithm of the right answer."),
+    (np.exp, "This is the exponential of the right answer."),
 )
 
 
@@ -46,6 +70,7 @@ class Numbers:
 
     formulas  of the numbers, from which mistakes are made; given are the quantities in them
     least, most  what mechanics allows: pairs of a number and the sentence that says why
+    chapter  the numbers that the same quantities have in the text of the chapter
     """
 
     value: Any
@@ -54,6 +79,7 @@ class Numbers:
     given: dict[str, float] = field(default_factory=dict)
     least: tuple[float, str] | None = None
     most: tuple[float, str] | None = None
+    chapter: dict[str, float] = field(default_factory=dict)
 
     @property
     def shapes(self) -> list[tuple[int, ...]]:
@@ -100,7 +126,7 @@ class Numbers:
         pairs = zip(answer.ravel(), value.ravel(), strict=True)
         return all(
             abs(a - b) <= 1e-3 * self.close
-            or any(np.isclose(a, rounded(b, n), rtol=1e-9) for n in (2, 3))
+            or any(np.isclose(a, shortened(b, n), rtol=1e-9).any() for n in (2, 3))
             or (np.isclose(a, rounded(b, 1), rtol=1e-9) and np.isclose(a, b, rtol=0.05))
             or abs(a - b) <= 0.1 * self.close * abs(value).max()
             for a, b in pairs
@@ -122,39 +148,62 @@ class Numbers:
         for factor, told in LOST[:2]:
             if self.agrees_alone(answer * factor, right):
                 return wrong("half", told)
-        found = self._from_formula(answer, i)
-        if found:
-            return found
-        for factor, told in LOST[2:]:
-            if self.agrees_alone(answer * factor, right):
-                return wrong("factor", told)
-        if right and self.agrees_alone(answer * right, 1.0):
-            return wrong("inverse", "This is one over the right answer.")
-        for power, told in ((2.0, "A square root is missing."), (0.5, "A square is missing.")):
-            if right > 0 and self.agrees_alone(answer, right**power):
-                return wrong("power", f"{told} Look at the exponents.")
+        return (
+            self._from_formula(answer, i)
+            or self._given(answer)
+            or self._related(answer, right)
+            or self._two_mistakes(answer, i)
+            or self._other_quantity(answer, i)
+            or self._outside(answer)
+        )
+
+    def _outside(self, answer: float) -> Verdict | None:
         for bound, side in ((self.least, -1), (self.most, 1)):
             if bound and side * (answer - bound[0]) > 0:
                 return wrong("bound", bound[1])
-        return self._two_mistakes(answer, i) or self._other_quantity(answer, i)
+        return None
+
+    def _formula(self, i: int) -> str:
+        return self.formulas[i] if i < len(self.formulas) else repr(float(np.ravel(self.value)[i]))
 
     def _from_formula(self, answer: float, i: int) -> Verdict | None:
-        if i >= len(self.formulas):
-            return None
-        mistakes = wrong_values(self.formulas[i], self.given)
-        mistakes.sort(key=lambda one: "takes the place" in one[1])
-        for number, told in mistakes:
-            if _same_digits(answer, number, self.close):
-                return wrong("formula", told)
+        """One mistake: to all digits that are given, nearly, or rounded."""
+        given = tuple(self.given.items())
+        mistakes = wrong_values(self._formula(i), given, tuple(self.chapter.items()))
+        for same in (fits, self.agrees_alone, _same_digits):
+            for number, told in mistakes:
+                if same(answer, number):
+                    return wrong("formula", told)
+        return None
+
+    def _given(self, answer: float) -> Verdict | None:
+        """Whether an answer is a number that the exercise gives."""
+        for name, number in self.given.items():
+            if number and self.agrees_alone(answer, number):
+                return wrong("combination", ANOTHER.format(name))
+        return None
+
+    def _related(self, answer: float, right: float) -> Verdict | None:
+        """Whether an answer is a factor or a function away from the right one."""
+        for factor, told in LOST[2:]:
+            if self.agrees_alone(answer * factor, right):
+                return wrong("factor", told)
+        with np.errstate(all="ignore"):
+            for function, told in RELATED:
+                if self.agrees_alone(answer, float(function(np.float64(right)))):
+                    return wrong("related", told)
         return None
 
     def _two_mistakes(self, answer: float, i: int) -> Verdict | None:
-        """A mistake in the formula, and a sign, a factor of two or a unit besides."""
-        mistakes = wrong_values(self.formulas[i], self.given) if i < len(self.formulas) else []
-        for factor, besides in FACTORS:
-            for number, told in mistakes:
-                if np.isclose(answer, factor * number, rtol=self.close, atol=0) and number:
+        """A mistake in the formula, and a sign, a factor of two or a unit besides; or two."""
+        formula, given = self._formula(i), tuple(self.given.items())
+        for change, besides in BESIDES:
+            for number, told in wrong_values(formula, given, tuple(self.chapter.items())):
+                if number and fits(answer, change(number)):
                     return wrong("formula", f"{told} {besides}")
+        for number, told in two_mistakes(formula, given):
+            if fits(abs(answer), abs(number)):
+                return wrong("formula", told)
         return None
 
     def _other_quantity(self, answer: float, i: int) -> Verdict | None:
@@ -165,24 +214,16 @@ class Numbers:
         for j in range(right.size):
             if j != i and self.agrees_alone(answer, right[j]):
                 return wrong("place", f"This is the right number {j + 1}: it belongs there only.")
-        if 0 < right[i] < 1 and np.isclose(answer, 1 - right[i], rtol=self.close):
-            return wrong("rest", "This is the rest: one minus the right answer.")
-        name = quantity(answer, self.given, self.close)
-        if name:
-            return wrong("combination", f"This is `{name}`: that is another quantity.")
-        formula = self.formulas[i] if i < len(self.formulas) else "0"
-        for number, told in two_mistakes(formula, tuple(self.given.items())):
-            if abs(answer - number) <= EXACT * abs(number):
-                return wrong("formula", told)
-        return None
+        told = quantity(answer, self.given, self._formula(i))
+        return wrong("combination", told) if told else None
 
     def agrees_alone(self, answer: float, right: float) -> bool:
         """Whether one number is right by itself."""
         if self.counts:
             return answer == right
-        return bool(np.isclose(answer, right, rtol=self.close, atol=0)) or answer == rounded(
-            right, 3
-        )
+        if not isclose(answer, right, rel_tol=0.05):
+            return False  # quickly: most numbers are far away
+        return abs(answer - right) <= self.close * abs(right) or answer == rounded(right, 3)
 
     def _several(self, answer: np.ndarray, value: np.ndarray) -> Verdict:
         if value.size <= 5 and any(self.resembles(p, value) for p in permutations(answer)):
@@ -233,16 +274,19 @@ def by_hand(
     close: float = CLOSE,
     least: tuple[float, str] | None = None,
     most: tuple[float, str] | None = None,
+    chapter: dict[str, float] | None = None,
 ) -> Numbers:
     """Numbers that have formulas; formulas that begin with ceil give integers."""
     found = [value(formula, given) for formula in formulas]
     numbers: Any = [int(x) for x in found] if formulas[0].startswith("ceil") else found
     whole = numbers[0] if len(numbers) == 1 else tuple(numbers)
-    return Numbers(whole, close, tuple(formulas), given, least, most)
+    return Numbers(whole, close, tuple(formulas), given, least, most, chapter or {})
 
 
-def _same_digits(answer: float, value: float, close: float) -> bool:
+def _same_digits(answer: float, value: float, close: float = CLOSE) -> bool:
     """Whether an answer is this number, perhaps rounded to two or three digits."""
-    if np.isclose(answer, value, rtol=close, atol=0):
+    if not isclose(answer, value, rel_tol=0.06):
+        return False  # quickly: most numbers are far away
+    if abs(answer - value) <= close * abs(value):
         return True
-    return any(np.isclose(answer, rounded(value, n), rtol=1e-9, atol=0) for n in (2, 3))
+    return any(isclose(answer, rounded(value, n), rel_tol=1e-9) for n in (2, 3))

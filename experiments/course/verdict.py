@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import floor, log10, trunc
 
 CLOSE = 1e-3  # relative error of numbers, and certificate of forces, that still counts as right
 
@@ -18,7 +19,7 @@ class Verdict:
 
 
 RIGHT = Verdict(True, "right", "right.")
-DIGITS = Verdict(False, "digits", "nearly right: the first digits are. Give three digits.")
+DIGITS = Verdict(False, "digits", "nearly right: the first digits are. Give three digits, rounded.")
 
 
 def wrong(kind: str, sentence: str, contact: int | None = None) -> Verdict:
@@ -28,3 +29,9 @@ def wrong(kind: str, sentence: str, contact: int | None = None) -> Verdict:
 def rounded(x: float, digits: int) -> float:
     """x with so many digits."""
     return float(f"{x:.{digits}g}")
+
+
+def shortened(x: float, digits: int) -> tuple[float, float]:
+    """x with so many digits: rounded, and cut off."""
+    size = 10.0 ** (digits - 1 - floor(log10(abs(x)))) if x else 1.0
+    return rounded(x, digits), trunc(x * size) / size
