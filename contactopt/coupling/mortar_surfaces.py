@@ -48,8 +48,12 @@ def couple_surfaces(
         m, loose = _carried(sides, meshes, SIDES[m.own])
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
-    # as well where a plane of symmetry of both cuts it.
-    own_held = mine.held[:, m.nodes]
+    # as well where a plane of symmetry of both cuts it. A contact that moved to where the other
+    # surface ends is no more at its node, which a support may hold.
+    moved = np.linalg.norm(m.points - carrier.points[:, m.nodes], axis=0)
+    own_held = mine.held[:, m.nodes] & (moved <= NEAR * np.ptp(m.points, axis=1).max())
+    if carrier.mirror is not None:
+        own_held |= mine.held[:, m.nodes] & carrier.mirror[:, m.nodes]
     other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
     if carrier.mirror is not None:
         other_held |= carrier.mirror[:, m.nodes]
@@ -81,7 +85,7 @@ def couple_surfaces(
             f" {loose:.2g} contacts for each of its nodes, so that it can bulge between them; take"
             f" carrier = '{other}', or a finer mesh of the {side} body."
         )
-        return replace(made, remarks=(said,))
+        return replace(made, thin=said)
     return made
 
 
