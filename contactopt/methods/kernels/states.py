@@ -32,10 +32,10 @@ from contactopt.defaults import EQUAL
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import has_entries
 from contactopt.problem import Infeasible, InterfaceProblem
+from contactopt.problem.feasibility import MARGIN
 
 PIVOT = 1e-8  # least pivot
 EXACT = 1e-10  # relative size of what rounding leaves of a zero in a contradiction
-MARGIN = 1e-7  # least constant of a contradiction, over the size of its terms
 BRANCH = 3e5  # entries that pivots change in the time that the rest of a branch takes
 FRESH = 50  # pivots after which a tableau is made anew from the data
 SAME = 1e-7  # relative size of what counts as zero when a point is given its states
