@@ -51,7 +51,7 @@ def couple_surfaces(
     # as well where a plane of symmetry of both cuts it. A contact that moved to where the other
     # surface ends is no more at its node, which a support may hold.
     moved = np.linalg.norm(m.points - carrier.points[:, m.nodes], axis=0)
-    own_held = mine.held[:, m.nodes] & (moved <= NEAR * np.ptp(m.points, axis=1).max())
+    own_held = mine.held[:, m.nodes] & (moved <= EQUAL * np.ptp(m.points, axis=1).max())
     if carrier.mirror is not None:
         own_held |= mine.held[:, m.nodes] & carrier.mirror[:, m.nodes]
     other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
