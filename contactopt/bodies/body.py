@@ -33,6 +33,7 @@ from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.bodies.thickness import thin_facets
 from contactopt.checks import check_size, place_words
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import MatrixPart
 
 CLOSED = 1e-3  # of the area of a face: the length of the integral of its normals that is none
-FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
@@ -284,7 +284,7 @@ def _mirrored_nodes(
     size = float(np.ptp(mesh.p, axis=1).max())
     for axis in range(len(unknowns)):
         others = np.delete(fixed, axis, axis=0)
-        plane = np.all(fixed[axis], axis=0) & (np.ptp(places[axis], axis=0) < FLAT * size)
+        plane = np.all(fixed[axis], axis=0) & (np.ptp(places[axis], axis=0) < EQUAL * size)
         made[axis, np.unique(nodes[:, plane & ~np.any(np.all(others, axis=1), axis=0)])] = True
     return made
 

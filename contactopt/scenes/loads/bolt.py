@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.checks import check_name, check_size, real_array, short
+from contactopt.defaults import ROUNDED
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.loads.load import Face, Load
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
     from contactopt.scenes.scene import Part
 
-ROUNDED = 1e-12  # of the force: a component that is zero but for rounding
 SLANTED = 1e-3  # cosine between a normal and a direction that lies in the face
 
 
