@@ -56,7 +56,7 @@ def deformed(
         ax = _draw_solid(scene, fields, scale, top, ax)
     else:
         ax = _draw_section(scene, fields, scale, top, ax, _mirror_plane(scene, problem))
-    times = f", displacements × {scale:g}" if scale != 1 else ""
+    times = f", displacements \N{MULTIPLICATION SIGN} {scale:g}" if scale != 1 else ""
     title = f"{scene.name}, {symbols(scene.friction)}{times}"
     ax.set_title(title, fontsize=ax.xaxis.label.get_size())
     return ax

@@ -42,7 +42,7 @@ def energies(path: PathResult, ax: Axes | None = None) -> Any:
     since = {key: value - value[0] for key, value in path.history.items()}
     state = np.arange(1, len(path.states) + 1)
     lost = since["external_work"] - since["elastic_energy"]
-    ax.plot(state, lost, "o", color=GREY, mfc="white", label="external work − elastic energy")
+    ax.plot(state, lost, "o", color=GREY, mfc="white", label="external work less elastic energy")
     ax.plot(state, since["friction_work"], color=ORANGE, label="friction work")
     ax.plot(state, since["step_work"], ":", color=GREEN, label="error of the steps")
     force, length = _units(path)

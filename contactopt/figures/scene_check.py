@@ -23,6 +23,7 @@ from contactopt.coupling.compliance import filling
 from contactopt.coupling.costs import FORM_OF, estimates
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.posed import Posed, posed, problem_of
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
@@ -36,7 +37,6 @@ from contactopt.solving.solve_scene import STEPS
 if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
 
-CLOSED = 1e-9  # of the size of a surface, within which a gap is what rounding leaves of zero
 FLAT = 0.01  # degrees by which normals may differ and still be one direction
 WORDS = {
     "dense": "Q as an array",
@@ -87,7 +87,12 @@ def check_scene(
     costs, memory = _costs(scene, made, options, once)
     coupled = [text for own in made.couplings for text in own.remarks]
     told = list(dict.fromkeys([*told, *said_of_meshes(scene), *heard]))
-    notes = [*told, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
+    notes = [
+        *told,
+        *_balance(states, made, free),
+        *doubts(scene, made.couplings, made.planes),
+        *coupled,
+    ]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
@@ -105,8 +110,7 @@ def check_scene(
     if scene.copies > 1:
         where = " and ".join(_direction(plane.inward) for plane in made.planes)
         where = where and f", across planes with normals {where}"
-        none = "; no support holds a plane of symmetry, so that none is known"
-        lines.append(f"{scene.copies} images make the whole{where or none}")
+        lines.append(f"{scene.copies} images make the whole{where}")
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states; the last one is described")
     lines += _cost_lines(costs, memory, len(states))
@@ -206,7 +210,7 @@ def _pair_lines(scene: Scene, pair: Contact, own: Coupling) -> list[str]:
     apart = float(np.degrees(np.arccos(np.clip(normals @ mean, -1.0, 1.0))).max(initial=0.0))
     varied = "" if apart < FLAT else f", which they leave by up to {apart:.3g} degrees"
     lines.append(f"  normals from '{pair.lower}' to '{pair.upper}': {_direction(mean)}{varied}")
-    touch = np.abs(own.gap) <= CLOSED * size
+    touch = np.abs(own.gap) <= EQUAL * size
     gap = np.where(touch, 0.0, own.gap)
     overlap = gap < 0
     words = [f"initial gap {gap.min():.4g} to {gap.max():.4g} {length}"]

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from contactopt.checks import place_words
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
 from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of
@@ -31,7 +32,6 @@ from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Later, Named, b
 from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
-SAME = 1e-9  # of the coordinates, within which places are those of one node
 
 
 def read_inp(path: Path) -> Any:
@@ -46,9 +46,13 @@ def read_inp(path: Path) -> Any:
     for block in blocks(path):
         verb, what = ("end", block.keyword[3:]) if block.keyword[:3] == "end" else ("", "")
         if block.keyword == "part":
+            if bare(block.need("name")) in parts:
+                raise block.fail(f"there are two parts {block.need('name')}")
             now = parts[bare(block.need("name"))] = Scope()
         elif block.keyword == "instance":
             now = _instance(parts, block)
+            if bare(now.name) in whole.instances:
+                raise block.fail(f"there are two instances {now.name}")
         elif what == "instance" and "instance" in opened:
             whole.add(now)
             now = whole
@@ -96,7 +100,7 @@ def _instance(parts: dict[str, Scope], block: Block) -> Scope:
     name, of = block.need("name"), block.need("part")
     if bare(of) not in parts:
         known = ", ".join(parts) or "none"
-        raise block.fail(f"instance {name} is of part {of}, which is not there; parts: {known}")
+        raise block.fail(f"instance {name} is of part {of}, which is not above; parts: {known}")
     made = parts[bare(of)].copy()
     made.name, made.move = name, inp_generation.motion(block, block.rows)
     return made
@@ -250,7 +254,7 @@ class Scope:
 
     def put(self, block: Block, tags: list[int], places: np.ndarray, name: str) -> None:
         """Add nodes, to a set if it has a name. The last place counts."""
-        size = SAME * np.abs(places).max(initial=0.0)
+        size = EQUAL * np.abs(places).max(initial=0.0)
         for tag, place in zip(tags, map(tuple, places.tolist())):
             before = self.nodes.setdefault(tag, place)
             if before != place and max(abs(a - b) for a, b in zip(before, place)) > size:

@@ -12,7 +12,8 @@ import skfem
 from scipy.spatial import KDTree
 
 from contactopt.checks import place_words
-from contactopt.errors import InputError
+from contactopt.defaults import CLOSE, EQUAL
+from contactopt.errors import Damaged, InputError
 from contactopt.meshes.cells import (
     area_vectors,
     joined,
@@ -22,11 +23,9 @@ from contactopt.meshes.cells import (
     volumes,
 )
 
-SAME = 1e-6  # places this fraction of a size apart are one place
 # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
 ONE, APART = 1e-4, 1e-3
 FLAT = 1e-10  # an element of less volume, over that of a cube of its size, is degenerate
-CLOSED = 1e-9  # what the normals of a closed surface may sum up to, over its area
 CORNERS = {  # of the elements that can be used
     **{"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "tetra": 4, "tetra10": 4},
     **{"hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8},
@@ -109,14 +108,14 @@ def middles(kind: str, places: np.ndarray) -> list[np.ndarray]:
 
 def in_order(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """The nodes (e, 27) of hexahedra whose last seven come in an order that formats do not agree
-    about, in that of meshio: each lies nearest to the middle that it is. ValueError if one is not.
+    about, in that of meshio: each lies nearest to the middle that it is. Damaged if one is not.
     """
     places = points[nodes].transpose(2, 1, 0)
     wanted = np.stack(middles("hexahedron20", places), axis=1)
     apart = np.linalg.norm(wanted[:, :, None] - places[:, None, 20:], axis=0)  # (7, 7, e)
     nearest = np.argmin(apart, axis=1).T
     if np.any(np.sort(nearest, axis=1) != np.arange(7)):
-        raise ValueError("the nodes in the faces of a hexahedron of 27 nodes lie at wrong places")
+        raise Damaged("the nodes in the faces of a hexahedron of 27 nodes lie at wrong places")
     return np.concatenate([nodes[:, :20], np.take_along_axis(nodes[:, 20:], nearest, 1)], axis=1)
 
 
@@ -213,7 +212,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     curved = len(cells.nodes) > len(cells.corners)
     nodes = mesh.doflocs[:, mesh.dofs.element_dofs] if curved else mesh.p[:, mesh.t]
     apart = np.abs(nodes.sum(axis=1) - cells.points[:, cells.nodes].sum(axis=1)).max(axis=0)
-    wrong = np.flatnonzero(apart > SAME * np.ptp(nodes, axis=1).max(axis=0))
+    wrong = np.flatnonzero(apart > CLOSE * np.ptp(nodes, axis=1).max(axis=0))
     if len(wrong):
         raise cells.refused(
             wrong[0],
@@ -238,7 +237,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     # the outward normals of a closed surface integrate to zero
     areas = area_vectors(mesh.p[:, outer_corners(mesh, mesh.boundary_facets())])
     total = np.abs(areas.sum(axis=1)).max()
-    if total > CLOSED * np.linalg.norm(areas, axis=0).sum():
+    if total > EQUAL * np.linalg.norm(areas, axis=0).sum():
         raise InputError(
             f"mesh file '{cells.path}': the surface of the body is not closed, its normals sum up"
             f" to {total:.3g}; elements overlap."
