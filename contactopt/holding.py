@@ -112,8 +112,8 @@ def limit(
     ----------
     scene : as for contactopt.run
     load : which load grows, as BODY:BOUNDARY:COMPONENT, or all those that begin with BODY or
-        BODY:BOUNDARY; BODY:body_force, bolt:NAME and, of a body without a mesh, BODY:force. None:
-        what the last step of the load path changes
+        BODY:BOUNDARY; or BODY:body_force, or bolt:NAME. A body without a mesh has BODY:force. With
+        None the loads grow that the last step of the load path changes
     note : receives progress messages
     changes : as for contactopt.run
 

@@ -24,7 +24,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How a scene is solved, and what is drawn of it. None stands for what is usual.
+    """How a scene is solved, and what is drawn of it. None means the default.
 
     Each is a keyword of contactopt.run and an option of `contactopt run`, where `max_unknowns` is
     written --max-unknowns. Those that the table [solve] of a scene file may hold are marked.

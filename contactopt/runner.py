@@ -106,7 +106,7 @@ def run(
     changes : to the arguments of a named scene, such as `elements`, or to the fields of a Scene
 
     Options from `method` to `max_memory` may stand in a scene file; those given here win. None
-    stands for what is usual.
+    means the default.
 
     Returns
     -------

@@ -11,6 +11,8 @@ import skfem
 from deck_shapes import block, bulk_data, element_rows, node_rows
 
 from contactopt import Material, Part, Rigid, Scene, Support, Traction, run
+from contactopt.checks import remembered
+from contactopt.cli import main
 from contactopt.errors import InputError
 from contactopt.meshes.mesh_files import load_bodies, load_mesh
 from contactopt.scenes.scene_files import read_scene_file
@@ -277,6 +279,22 @@ MEANT = {
     "elements before nodes": (
         "*ELEMENT, TYPE=CPE4, ELSET=B\n1,1,2,3,4\n*NSET,NSET=S\n1,2\n" + SQUARE, 1, {"S": 1}, 4,
     ),
+    "sets and surfaces above what they name": (
+        "*SURFACE, NAME=P, TYPE=NODE\nS, 1.\n*NSET, NSET=T, ELSET=FIRST\n*NSET, NSET=Q\nP\n"
+        "*SURFACE, NAME=R\nFIRST, S4\n*NSET, NSET=S\n1,2,3\n*ELSET, ELSET=FIRST\n1\n" + GROWN,
+        3, {"S": 2, "P": 2, "Q": 2, "T": 3, "R": 1}, 8,
+    ),
+    "what is made above what it is made from": (
+        "*ELCOPY, ELEMENT SHIFT=10, OLD SET=B, SHIFT NODES=50, NEW SET=B2\n"
+        "*NCOPY, CHANGE NUMBER=50, OLD SET=N, SHIFT, NEW SET=M\n1.,0.,0.\n"
+        "*ELSET, ELSET=ALL\nB, B2\n*SURFACE, NAME=S\nALL, S3\n" + BRICK + "\n",
+        2, {"S": 2}, 12,
+    ),
+    "grown above": (
+        "*ELGEN, ELSET=B\n1,3,1,1\n*NGEN, NSET=LOW\n1,4\n*NGEN, NSET=UP\n11,14,1\n" + ROW
+        + "*ELEMENT, TYPE=CPE4\n1,1,2,12,11\n",
+        3, {"LOW": 3, "UP": 3}, 8,
+    ),
     "unknown words in a step": (ONE + RIGHT + "*STEP\n*SOLVE IT\n1\n*END STEP\n", 1, {"S": 1}, 4),
     "words after another": (
         ONE + RIGHT + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nN,20.\n*TIE, NAME=T\nS,S\n*TRANSFORM,"
@@ -290,7 +308,8 @@ MEANT = {
 def test_a_keyword_means_what_the_manual_says(tmp_path, name):
     text, volume, areas, corners = MEANT[name]
     (tmp_path / "deck.inp").write_text(text)
-    check(tmp_path / "deck.inp", "B" if name != "elcopy" else "ALL", volume, areas, corners)
+    group = "ALL" if "*ELCOPY" in text else "B"
+    check(tmp_path / "deck.inp", group, volume, areas, corners)
 
 
 # what is written, the line of the fault, and words of the message
@@ -326,6 +345,14 @@ REFUSED = {
     "no such file": ("*INCLUDE, INPUT=other.inp\n" + ONE, 1, "other.inp"),
     "no file of nodes": (ONE.replace("*NODE", "*NODE, INPUT=n.inp"), 1, "n.inp"),
     "a word for a number": (ONE.replace("3,1,1", "3,one,1"), 4, "'one' is no number"),
+    "a number beyond all": (ONE.replace("3,1,1", "3,1e400,1"), 4, "'1e400' is not below 1e+100"),
+    "a number beyond volumes": (ONE.replace("3,1,1", "3,-1e200,1"), 4, "is not below 1e+100"),
+    "no number": (ONE.replace("3,1,1", "3,nan,1"), 4, "'nan' is no number"),
+    "a set that is nowhere": ("*NSET, NSET=A\nC\n*NSET, NSET=C\nD\n" + ONE, 4, "no set D of nodes"),
+    "range of one number": (ONE + "*NSET, NSET=A, GENERATE\n1\n", 9, "range"),
+    "nodes of elements that are nowhere": (
+        "*NSET, NSET=A, ELSET=E\n*ELSET, ELSET=E\n9\n" + ONE, 1, "element 9 is not there",
+    ),
     "a long number": (ONE.replace("3,1,1", "9" * 5000 + ",1,1"), 4, "no whole number"),
     "a step that misses": (ROW + "*NGEN\n1,4,2\n", 7, "step"),
     "fill of other sets": (STRIP + "*NFILL\nLOW,ENDS,2\n*NFILL\nLOW,NO,2\n", 13, "no set NO"),
@@ -366,6 +393,32 @@ def test_data_in_other_files(tmp_path):
     (tmp_path / "e.inp").write_text("\n1,1,2,3,9\n")
     with pytest.raises(InputError, match=r"e\.inp', line 2: an element CPE4 names a node"):
         load_mesh(path)
+
+
+def test_an_included_file_may_hold_data_alone(tmp_path):
+    """It stands in the place of its line: what follows belongs to the same keyword."""
+    (tmp_path / "n.txt").write_text("** nodes\n2,1,0\n*INCLUDE, INPUT=m.txt\n")
+    (tmp_path / "m.txt").write_text("3,1,1\n")
+    (tmp_path / "s.txt").write_text("1\n*NSET, NSET=S\n2\n")
+    path, rows = tmp_path / "deck.inp", SQUARE.splitlines(keepends=True)
+    text = f"{rows[0]}{rows[1]}*INCLUDE,\nINPUT=n.txt\n{rows[4]}" + ONE.removeprefix(SQUARE)
+    path.write_text(text + "*NSET, NSET=T\n*INCLUDE, INPUT=s.txt\n1\n*NSET, NSET=T\n4\n")
+    check(path, "B", 1, {"S": 1, "T": 1}, 4)
+    (tmp_path / "m.txt").write_text("\n3,one,1\n")
+    with pytest.raises(InputError, match=r"m\.txt', line 2: 'one' is no number"):
+        load_mesh(path)
+    (tmp_path / "m.txt").write_text("*INCLUDE, INPUT=deck.inp\n")
+    with pytest.raises(InputError, match="include each other"):
+        load_mesh(path)
+
+
+def test_a_node_that_is_there_twice_is_told(tmp_path, capsys):
+    (tmp_path / "deck.inp").write_text(ONE.replace("4,0,1\n", "4,0,1\n2,1,0\n1,-1,0\n"))
+    mesh = load_mesh(tmp_path / "deck.inp")
+    (said,) = remembered(mesh)
+    assert said.endswith("line 1: node 1 is there twice; it moves from (0, 0, 0) to (-1, 0, 0)")
+    assert main(["mesh", str(tmp_path / "deck.inp"), "--no-page"]) == 0
+    assert f"# note: {said}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("coding", ["utf-8-sig", "latin-1", "utf-8"])

@@ -15,7 +15,6 @@ CALQUES = (
     r"\bdrawn anew\b",
     r"\bprograms? of others\b",
     r"\bask it before\b",
-    r"\bwhat it spoils\b",
     r"\btimes the least of\b",
     r"\bof a load path (?:it|this|the deck) (?:is|has)\b",
     r"\bfrom here on (?:it|the|some)\b",
@@ -41,6 +40,18 @@ CALQUES = (
     r"\bcomes into question\b",
     r"\bto the contrary of\b",
     r"\bstands? to choice\b",
+    r"\b(?:derivative|gradient)s? by (?:the|its|all|an?|loads|these|some)\b(?! nodal)",
+    r"\bin (?:its|the) head of this\b",
+    r"\bunits in its head\b",
+    r"\bsomething else than\b",
+    r"\bwhat (?:it )?spoils it\b",
+    r"\bfor a strong one\b",
+    r"\btwo like (?:bodies|cylinders|spheres)\b",
+    r"\bwhat the forces move\b",
+    r"\bstands? for what is usual\b",
+    r"\bsolvers? knows? no\b",
+    r"\bunit\S* says? it of\b",
+    r"\b(?:contacts?|problems?) in the space\b",
 )
 FOLDERS = ("contactopt", "experiments/site", "experiments/course", "experiments/tutorials")
 KINDS = {".py", ".md", ".toml", ".js", ".html"}

@@ -895,16 +895,53 @@ SU2 = (
 )
 
 
+# a square of two triangles with a line below it
+MSH2 = (
+    '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n1 3 "low"\n$EndPhysicalNames\n'
+    "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n$Elements\n3\n1 1 2 3 3 1 2\n"
+    "2 2 2 7 7 1 2 3\n3 2 2 7 7 1 3 4\n$EndElements\n"
+)
+VIEW = '$NodeData\n1\n"T"\n1\n0.0\n3\n0\n1\n1\n2 20.5\n$EndNodeData\n'
+MEDIT = (
+    "MeshVersionFormatted 2\nDimension 2\nVertices\n4\n0 0 0\n1 0 0 # corner\n1. 1e0 0\n0 1 0\n"
+    "Edges\n1\n1 2 3\nTriangles\n2\n1 2 3 7\n1 3 4 7\nCorners\n2\n1\n2\nEnd\n"
+)
+
+
+@pytest.mark.parametrize(
+    "name, text, low",
+    [
+        ("a.msh", MSH2 + VIEW, "low"),
+        ("a.msh", MSH2 + VIEW + VIEW.replace("Node", "Element").replace("T", "s"), "low"),
+        ("a.mesh", MEDIT, "3"),
+        ("a.mesh", " ".join(MEDIT.replace(" # corner", "").split()), "3"),
+        ("a.mesh", MEDIT.replace(" ", "\n").replace("#\ncorner", ""), "3"),
+    ],
+)
+def test_results_are_passed_over_and_free_formats_are_free(tmp_path, name, text, low):
+    (tmp_path / name).write_text(text)
+    mesh = load_mesh(tmp_path / name)
+    assert volume(mesh) == pytest.approx(1) and len(mesh.boundaries[low]) == 1
+    for end in range(20, len(text) - 4, 9):  # a file that is cut has its volume, or is refused
+        (tmp_path / name).write_text(text[:end])
+        try:
+            assert volume(load_mesh(tmp_path / name)) == pytest.approx(1)
+        except InputError as error:
+            assert "\n" not in str(error)
+
+
 @pytest.mark.parametrize(
     "name, text, words",
     [
+        ("a.mesh", MEDIT.replace("Edges", "Polygons"), "line 9: Polygons are not read"),
+        ("a.mesh", MEDIT.replace("1 3 4 7", "1 3 4"), "Triangles are 2 rows of 4 numbers, not 7"),
         ("a.su2", SU2.replace("5 0 1 2 0", "22 0 1 2 4 5 6 0"), r"line 4: elements of type 22"),
         ("a.su2", SU2 + "NDIME= 2\n", r"line 22: it has several zones"),
         ("a.su2", SU2[:-6], "ends before the 1 rows of MARKER_ELEMS"),
         (
             "a.mesh",
             "MeshVersionFormatted 2\nDimension 3\nTetrahedraP2\n",
-            r"order \(TetrahedraP2\)",
+            r"line 3: TetrahedraP2 are not read",
         ),
         ("a.unv", "    -1\n  2411\n", "its ending names no format"),
     ],

@@ -65,7 +65,7 @@ NOISE = 1e-14  # what rounding leaves of a zero
 
 
 class Trace(NamedTuple):
-    """The displacement on the contact surface, as in the head of this module.
+    """The displacement on the contact surface, as at the top of this module.
 
     nodes    (k,) contact nodes of the body; one at a corner is named once for each side
     areas    (k,) nodal areas, the integrals of the hat functions

@@ -178,7 +178,7 @@ def _reload(body: GivenMatrices, scene: Scene, part: MatrixPart) -> GivenMatrice
 
 
 def _matrices(part: MatrixPart, x: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray, sp.csr_matrix]:
-    """K and f on all unknowns U (n,), and D (dim N, n), as in the head of this module."""
+    """K and f on all unknowns U (n,), and D (dim N, n), as at the top of this module."""
     n, K, f, T = x.size, part.K, part.f, part.constraints
     if T is None:
         if K.shape[0] != n:

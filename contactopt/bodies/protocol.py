@@ -13,8 +13,8 @@ lambda (p,) it moves by
 where C (n, n) is its compliance: symmetric, positive semidefinite and never formed. The resultants
 (p,) are the work of the loads in each free motion, which the contact forces have to balance.
 
-Stresses, errors of elements, resultants of supports and derivatives by loads are functions of a
-`view` of its matrices and of its mesh (contactopt.bodies.views).
+Stresses, errors of elements, resultants of supports and derivatives with respect to loads are
+functions of a `view` of its matrices and of its mesh (contactopt.bodies.views).
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class Seen:
 
 
 class Body(ABC):
-    """A body that moves under contact forces, as in the head of this module.
+    """A body that moves under contact forces, as at the top of this module.
 
     name      its name in the scene
     unknowns  number of its free displacement unknowns, for tables

@@ -53,8 +53,8 @@ STEEP = 12.0  # of the weights: `pytest tests/test_recovery.py -k hole`, error 0
 
 @dataclass(frozen=True, eq=False)
 class StressMap:
-    """The recovered stress at m places of a body as a linear map of its displacement, as in the
-    head of this module.
+    """The recovered stress at m places of a body as a linear map of its displacement, as at the
+    top of this module.
 
     places     (dim, m) [length];   sources  (m,) vertices of the mesh, -1 for a place that is none
     fit        of the stresses of the elements around each place

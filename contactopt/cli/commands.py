@@ -125,7 +125,9 @@ def mesh(options: argparse.Namespace) -> int:
         fine = dict(options.fine)
         names = {new: old.split(",") for new, old in options.name}
         mesh_part(part, path, options.size, fine, names, options.order)
-    meshes, refused = load_bodies(path)
+    with overheard() as told:
+        meshes, refused = load_bodies(path)
+    refused += told
     text, named = mesh_words(path, meshes)
     print("\n".join([text, *(f"# note: {note}" for note in refused)]))
     if options.no_page or not meshes:

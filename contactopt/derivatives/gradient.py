@@ -1,4 +1,4 @@
-"""The gradient of a quantity of a solved scene by the parameters of the scene."""
+"""The gradient of a quantity of a solved scene with respect to the parameters of the scene."""
 
 from __future__ import annotations
 

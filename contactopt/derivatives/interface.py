@@ -44,8 +44,8 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Dual:
-    """The gradient of a function of the solution by the data of the problem, in the unit of the
-    function over theirs.
+    """The gradient of a function of the solution with respect to the data of the problem,
+    in the unit of the function over theirs.
 
     q   (k, dim);  mu  (k,) by the law's parameter at each contact;  s  (p,)
     reactions, multipliers  of the solution, with which df = sum (q r') * dQ + sum V * dV
@@ -205,10 +205,10 @@ class Sensitivity:
         multipliers: ArrayLike | None = None,
         displacements: ArrayLike | None = None,
     ) -> Dual:
-        """The gradient by all data of f(r, lambda, u) with the derivatives `reactions` (k, dim),
-        `multipliers` (p,) and `displacements` (k, dim), from one transposed solve. Where contacts
-        are weakly active it is that of the piece at which the solver ended. InputError as
-        forward().
+        """The gradient with respect to all data of f(r, lambda, u) with the derivatives `reactions`
+        (k, dim), `multipliers` (p,) and `displacements` (k, dim), from one transposed solve.
+        Where contacts are weakly active it is that of the piece at which the solver ended.
+        InputError as forward().
         """
         problem = self.problem
         by_r = _given("reactions", reactions, problem.q.shape)
@@ -239,8 +239,8 @@ class Sensitivity:
 def sensitivity(
     problem: InterfaceProblem, solution: Solution, distance: float | None = None
 ) -> Sensitivity:
-    """The derivative of a certified solution by the data of its problem, as an operator with
-    products forward and adjoint.
+    """The derivative of a certified solution with respect to the data of its problem, as an
+    operator with products forward and adjoint.
 
     Nothing is solved before it is asked for; the factors are then kept and serve all directions.
 

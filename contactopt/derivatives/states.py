@@ -6,8 +6,8 @@ by dmu. A change dA of a stiffness acts like the load -dA U: dU = -C dA U, so th
 is ever formed. What follows is contactopt.derivatives.interface.
 
 The adjoint takes the gradient (q*, s*, mu*) by these data back to the bodies. With G_b = B_b' q*
-and W_b = C_b G_b + motions_b s* the derivative by a constant of a material is -W_b' dA_b U_b, and
-that by a load f is W_b' df: one solve per body serves all parameters.
+and W_b = C_b G_b + motions_b s* the derivative with respect to a constant of a material is
+-W_b' dA_b U_b, and that by a load f is W_b' df: one solve per body serves all parameters.
 
 On a load path the slip of a state is measured from the state before, q_t = q_t(theta) - u_t before.
 Forward, du_t before is handed on from state to state; backward, the gradient by u_t before is added
@@ -144,7 +144,7 @@ class Step(State):
 
 @dataclass(frozen=True, eq=False)
 class Duals:
-    """The gradient by a state's data taken to the bodies: G, s* and W of the head."""
+    """The gradient with respect to a state's data taken to the bodies: G, s* and W of the head."""
 
     state: State
     dual: Dual

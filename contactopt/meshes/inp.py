@@ -23,13 +23,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from contactopt.checks import place_words
 from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
-from contactopt.meshes.inp_elements import CORNERS, FACET, dimension, kind_of, side_of
-from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Named, bare, blocks, set_of
+from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of
+from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Later, Named, bare, blocks, set_of
 from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
+SAME = 1e-9  # of the coordinates, within which places are those of one node
 
 
 def read_inp(path: Path) -> Any:
@@ -53,8 +55,7 @@ def read_inp(path: Path) -> Any:
         elif what == "part":
             now = whole
         elif not verb and block.keyword != "assembly":
-            getattr(now, "section" if block.keyword in SECTIONS else block.keyword)(block)
-        block.rows = []
+            now.read(block)
         if verb and opened.pop(what, None) is None:
             raise block.fail(f"there is no *{what.upper()} that it ends")
         if block.keyword in ("part", "assembly", "instance"):
@@ -73,7 +74,7 @@ def read_inp(path: Path) -> Any:
     if whole.passed:
         log.warning("%s: elements without extent are left out: %s", path, ", ".join(whole.passed))
     whole.tell_sections()
-    cells = [(kind, nodes, ids) for kind, nodes, ids, _ in whole.blocks if kind] + whole.facets()
+    cells = [(kind, nodes, ids) for kind, nodes, ids, _ in whole.blocks if kind] + facets(whole)
     tags = np.array(sorted(whole.nodes), dtype=np.int64)
     points = np.array([whole.nodes[tag] for tag in tags.tolist()]).reshape(-1, 3)
     of_cells = {
@@ -109,6 +110,7 @@ class Scope:
 
     ngen, nfill, ncopy = inp_generation.ngen, inp_generation.nfill, inp_generation.ncopy
     elgen, elcopy = inp_generation.elgen, inp_generation.elcopy
+    system, places = inp_generation.system, inp_generation.places
 
     def __init__(self) -> None:
         self.nodes: dict[int, tuple[float, ...]] = {}
@@ -124,8 +126,27 @@ class Scope:
         self.sections: list[tuple[Scope, int, Block]] = []  # where their sets are, as for instances
         self.instances: dict[str, tuple[Scope, int]] = {}  # with what numbers grow by
         self.name = ""
+        self.later: list[Block] = []  # that wait for what stands below them
         self.frame = np.zeros(3), Rotation.identity()  # of *SYSTEM: origin, directions
         self.move: Any = None  # of an instance
+
+    def read(self, block: Block) -> None:
+        """Do what a block says, now or, where what it names is not there yet, in settle()."""
+        try:
+            getattr(self, "section" if block.keyword in SECTIONS else block.keyword)(block)
+            block.rows = []
+        except Later:
+            self.later.append(block)
+
+    def settle(self) -> None:
+        """Do what waits; Later with the line of what is nowhere."""
+        left = [None] * (1 + len(self.later))
+        while len(self.later) < len(left):
+            left, self.later = self.later, []  # type: ignore[assignment]
+            for block in left:
+                self.read(block)  # type: ignore[arg-type]
+        for block in reversed(self.later):
+            getattr(self, block.keyword)(block)
 
     def copy(self) -> Scope:
         """A scope of the same contents, to which others can be added."""
@@ -178,6 +199,7 @@ class Scope:
         """Raise InputError with the line of what names a node or element that is not there. Ranges
         may have gaps, which are left out.
         """
+        self.settle()
         known = np.fromiter(self.nodes, np.int64)
         for kind, nodes, _, where in self.blocks:
             lost = np.argwhere(~np.isin(nodes, known) & (nodes > 0 if not kind else True))
@@ -212,37 +234,8 @@ class Scope:
             for place, (_, _, ids, _) in enumerate(self.blocks):
                 count = len(_places(ids - by, members))
                 if count and 0 < dimension(self.types[place]) < most:
-                    said = "%s, line %d: the stiffness of %d elements %s is left out"
-                    log.warning(said, block.path, block.line, count, self.types[place])
-
-    def system(self, block: Block) -> None:
-        """Coordinates of nodes are from now on those in other directions from another origin."""
-        values = [[block.real(line, word) for word in words] for line, words in block.rows]
-        first, second = [*values, [], []][:2]
-        if len(first) not in (0, 3, 6) or len(second) not in (0, 3) or len(values) > 2:
-            raise block.fail("*SYSTEM needs three or six coordinates, and three more or none")
-        origin, turn = np.array(first[:3] or [0.0] * 3), Rotation.identity()
-        if len(first) == 6:
-            x = np.array(first[3:]) - origin
-            z = np.cross(x, np.array(second) - origin) if second else np.array([0.0, 0.0, 1.0])
-            x = x if second else x * [1, 1, 0]
-            if not np.any(x) or not np.any(z):
-                raise block.fail("the axes of *SYSTEM have no direction")
-            x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
-            turn = Rotation.from_matrix(np.stack([x, np.cross(z, x), z], axis=1))
-        self.frame = origin, turn
-
-    def places(self, block: Block, rows: list[list[float]]) -> np.ndarray:
-        """Places (n, 3) from coordinates, which may be those of a cylinder, in the frame."""
-        x = np.array(rows, dtype=float).reshape(-1, 3)
-        kind = block.options.get("system", "R").upper()
-        if kind == "C":
-            angle = np.radians(x[:, 1])
-            x[:, :2] = (x[:, 0] * [np.cos(angle), np.sin(angle)]).T
-        elif kind not in ("R", "RC"):
-            raise block.fail(f"coordinates of SYSTEM={kind} are not known here; write them as R")
-        origin, turn = self.frame
-        return np.asarray(turn.apply(x) + origin if len(x) else x)
+                    said = "the stiffness of %d elements %s is left out"
+                    block.warn(said, count, self.types[place])
 
     def node(self, block: Block) -> None:
         tags, rows = list[int](), list[list[float]]()
@@ -253,15 +246,19 @@ class Scope:
             rows.append([block.real(line, word) for word in (*words[1:4], "", "", "")[:3]])
             if tags[-1] < 1:
                 raise block.fail("numbers of nodes begin with 1", line)
-        made = dict(zip(tags, map(tuple, self.places(block, rows).tolist())))
-        changed = [tag for tag in made if self.nodes.get(tag, made[tag]) != made[tag]]
-        changed += [] if len(made) == len(tags) else ["of one block"]  # type: ignore[list-item]
-        if changed:
-            said = "%s, line %d: nodes get another place, the first is %s; the last place counts"
-            log.warning(said, block.path, block.line, changed[0])
-        self.nodes |= made
-        if "nset" in block.options:
-            set_of(self.node_sets, block.need("nset")).update(dict.fromkeys(made))
+        self.put(block, tags, self.places(block, rows), block.options.get("nset", ""))
+
+    def put(self, block: Block, tags: list[int], places: np.ndarray, name: str) -> None:
+        """Add nodes, to a set if it has a name. The last place counts."""
+        size = SAME * np.abs(places).max(initial=0.0)
+        for tag, place in zip(tags, map(tuple, places.tolist())):
+            before = self.nodes.setdefault(tag, place)
+            if before != place and max(abs(a - b) for a, b in zip(before, place)) > size:
+                said = "node %d is there twice; it moves from (%s) to (%s)"
+                block.warn(said, tag, place_words(before), place_words(place))
+            self.nodes[tag] = place
+        if name:
+            set_of(self.node_sets, name).update(dict.fromkeys(tags))
 
     def element(self, block: Block) -> None:
         named = block.need("type").upper()
@@ -306,54 +303,61 @@ class Scope:
         self.blocks.append((kind_of(named)[0], nodes, ids, where))
 
     def nset(self, block: Block) -> None:
-        mine = set_of(self.node_sets, block.need("nset"))
+        name, mine = block.need("nset"), Named()
         if "elset" in block.options:
-            of = self.numbers(block.need("elset"), "element_sets", block)
+            of = self.there(block.need("elset"), block)
             for _, nodes, ids, _ in self.blocks:
                 own = nodes[_places(ids, of)].ravel().tolist()
                 mine.update(dict.fromkeys(node for node in own if node))
         else:
-            self._extend(mine, "node_sets", block)
+            mine = self._named("node_sets", block)
+        set_of(self.node_sets, name).update(mine)
         if "unsorted" in block.options:
-            self.unsorted.add(bare(block.options["nset"]))
+            self.unsorted.add(bare(name))
 
     def elset(self, block: Block) -> None:
-        self._extend(set_of(self.element_sets, block.need("elset")), "element_sets", block)
+        name, mine = block.need("elset"), self._named("element_sets", block)
+        set_of(self.element_sets, name).update(mine)
 
     def surface(self, block: Block) -> None:
         kind, name = block.options.get("type", "element").lower(), block.need("name")
         if kind == "node":
             block.rows = [(line, words[:1]) for line, words in block.rows]
-            self._extend(set_of(self.node_sets, name), "node_sets", block)
+            mine = self._named("node_sets", block)
+            set_of(self.node_sets, name).update(mine)
         elif kind == "element":
             shown = next((own for own in self.surfaces if bare(own) == bare(name)), name)
+            rows = []
             for line, words in block.rows:
                 label = words[1].upper() if len(words) > 1 else ""
                 found = self.numbers(words[0], "element_sets", block, line)
-                rows = self.surfaces.setdefault(shown, [])
                 rows.append((list(found), label, block, line))
+            self.surfaces.setdefault(shown, []).extend(rows)
         else:
-            log.info("%s: surface %s of type %s is no part of a mesh", block.path, name, kind)
+            log.info("surface %s of type %s is no part of a mesh", name, kind)
 
-    def _extend(self, mine: Named, sets: str, block: Block) -> None:
-        """Add to a set what rows name: numbers, ranges or other sets."""
+    def _named(self, sets: str, block: Block) -> Named:
+        """What rows name: numbers, ranges or other sets."""
+        mine = Named()
         for line, words in block.rows:
             if "generate" not in block.options:
                 for word in filter(None, words):
                     mine.update(self.numbers(word, sets, block, line))
                 continue
-            first, last, *step = (block.whole(line, word) for word in words if word)
-            if len(step) > 1 or last < first or (step or [1])[0] < 1:
+            row = [block.whole(line, word) for word in words if word]
+            first, last, step = (*row, 1)[:3] if len(row) in (2, 3) else (1, 0, 1)
+            if last < first or step < 1:
                 raise block.fail("a range needs its first and last number and a step", line)
             by = self._of_instance(block, line)[1]
-            mine.update(dict.fromkeys(n + by for n in range(first, last + 1, *step)))
+            mine.update(dict.fromkeys(n + by for n in range(first, last + 1, step)))
             ends: Named = dict.fromkeys((first + by, last + by), (block, line))
             mine.update(ends)
+        return mine
 
     def _of_instance(self, block: Block, line: int | None) -> tuple[Scope, int]:
         name = block.options.get("instance", "")
         if name and bare(name) not in self.instances:
-            raise block.fail(f"there is no instance {name}", line)
+            raise block.fail(f"there is no instance {name}", line, Later)
         return self.instances[bare(name)] if name else (self, 0)
 
     def numbers(self, word: str, sets: str, block: Block, line: int | None = None) -> Named:
@@ -364,52 +368,17 @@ class Scope:
             own, by = self.instances[bare(before)]
             word = after
         if word.isdigit():
-            return {block.whole(line or block.line, word) + by: (block, line or block.line)}
+            place = block.place if line is None else line
+            return {block.whole(place, word) + by: (block, place)}
         known = {bare(name): found for name, found in getattr(own, sets).items()}
         if bare(word) not in known:
-            raise block.fail(f"there is no set {word} of {sets.split('_')[0]}s", line)
+            raise block.fail(f"there is no set {word} of {sets.split('_')[0]}s", line, Later)
         return {number + by: where for number, where in known[bare(word)].items()}
 
-    def facets(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Blocks of facets that stand for the surfaces, whose numbers are new."""
-        made = []
-        most = max(dimension(named) for named in self.types.values())
-        new = 1 + max(self.elements)
-        for name, rows in self.surfaces.items():
-            for members, label, block, line in rows:
-                for number in members:
-                    if number not in self.elements:
-                        word = f"element {number % LARGEST}"
-                        raise block.fail(f"surface '{name}' names {word}, which is not there", line)
-                sides = self._sides(members, label, block, line, most)
-                for corners in sides if label else _free(sides):
-                    ids = new + np.arange(len(corners))
-                    made.append((FACET[corners.shape[1]], corners, ids))
-                    set_of(self.element_sets, name).update(dict.fromkeys(ids.tolist()))
-                    new += len(corners)
-        return made
-
-    def _sides(
-        self, members: Iterable[int], label: str, block: Block, line: int, dim: int
-    ) -> list[np.ndarray]:
-        """Corners of the sides of elements that a row of a surface means."""
-        found = []
-        for place, (_, nodes, ids, _) in enumerate(self.blocks):
-            own = nodes[_places(ids, members)]
-            sides = side_of(self.types[place], label, dim) if len(own) else ()
-            if sides is None:
-                what = label or "that could be meant"
-                raise block.fail(f"an element {self.types[place]} has no side {what}", line)
-            found += [own[:, list(side)] for side in sides]
+    def there(self, word: str, block: Block) -> Named:
+        """The elements that a word stands for, which are there but for gaps in ranges."""
+        found = self.numbers(word, "element_sets", block)
+        for number, where in found.items():
+            if where is not None and number not in self.elements:
+                raise block.fail(f"element {number % LARGEST} is not there", error=Later)
         return found
-
-
-def _free(sides: list[np.ndarray]) -> list[np.ndarray]:
-    """Those sides that belong to one element alone, by their number of corners."""
-    made = []
-    for width in {own.shape[1] for own in sides}:
-        corners = np.concatenate([own for own in sides if own.shape[1] == width])
-        keys = np.sort(corners, axis=1)
-        _, place, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-        made.append(corners[count[place.ravel()] == 1])
-    return made

@@ -8,6 +8,15 @@ chapters "Element types" and "*SURFACE"; Abaqus user's manual, "Element library"
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from contactopt.meshes.inp_text import LARGEST, Block, set_of
+
+if TYPE_CHECKING:
+    from contactopt.meshes.inp import Scope
 
 PLANE = {
     "3": ("triangle", 3), "6": ("triangle6", 6),
@@ -90,3 +99,49 @@ def side_of(named: str, label: str, dim: int) -> tuple[tuple[int, ...], ...] | N
         return None
     first = int(number[1]) - 1 - 2 * (family == "shell" and label[0] == "S")
     return faces[first : first + 1] or None if first >= 0 else None
+
+
+def facets(scope: Scope) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Blocks of facets that stand for the surfaces, whose numbers are new."""
+    made = []
+    most = max(dimension(named) for named in scope.types.values())
+    new = 1 + max(scope.elements)
+    for name, rows in scope.surfaces.items():
+        for members, label, block, line in rows:
+            for number in members:
+                if number not in scope.elements:
+                    word = f"element {number % LARGEST}"
+                    raise block.fail(f"surface '{name}' names {word}, which is not there", line)
+            sides = _sides(scope, members, label, block, line, most)
+            for corners in sides if label else _free(sides):
+                ids = new + np.arange(len(corners))
+                made.append((FACET[corners.shape[1]], corners, ids))
+                set_of(scope.element_sets, name).update(dict.fromkeys(ids.tolist()))
+                new += len(corners)
+    return made
+
+
+def _sides(
+    scope: Scope, members: Iterable[int], label: str, block: Block, line: int, dim: int
+) -> list[np.ndarray]:
+    """Corners of the sides of elements that a row of a surface means."""
+    found = []
+    for place, (_, nodes, ids, _) in enumerate(scope.blocks):
+        own = nodes[np.flatnonzero(np.isin(ids, np.fromiter(members, np.int64)))]
+        sides = side_of(scope.types[place], label, dim) if len(own) else ()
+        if sides is None:
+            what = label or "that could be meant"
+            raise block.fail(f"an element {scope.types[place]} has no side {what}", line)
+        found += [own[:, list(side)] for side in sides]
+    return found
+
+
+def _free(sides: list[np.ndarray]) -> list[np.ndarray]:
+    """Those sides that belong to one element alone, by their number of corners."""
+    made = []
+    for width in {own.shape[1] for own in sides}:
+        corners = np.concatenate([own for own in sides if own.shape[1] == width])
+        keys = np.sort(corners, axis=1)
+        _, place, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+        made.append(corners[count[place.ravel()] == 1])
+    return made

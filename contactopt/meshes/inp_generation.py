@@ -1,5 +1,5 @@
-"""Nodes and elements of input files that are made from others: *NGEN, *NFILL, *NCOPY, *ELGEN and
-*ELCOPY. Each function is a method of contactopt.meshes.inp.Scope.
+"""Places of the nodes of input files, *SYSTEM, and nodes and elements that are made from others:
+*NGEN, *NFILL, *NCOPY, *ELGEN and *ELCOPY. Each function is a method of contactopt.meshes.inp.Scope.
 
 Source: Abaqus keywords reference manual.
 """
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from contactopt.meshes.inp_text import Block, Row, bare, set_of
+from contactopt.errors import InputError
+from contactopt.meshes.inp_text import Block, Later, Row, bare, set_of
 
 if TYPE_CHECKING:
     from contactopt.meshes.inp import Scope
@@ -39,6 +40,37 @@ def motion(block: Block, rows: list[Row]) -> Callable[[np.ndarray], np.ndarray]:
     return lambda x: np.asarray(turn.apply(x + shift - centre) + centre if len(x) else x)
 
 
+def system(scope: Scope, block: Block) -> None:
+    """Coordinates of nodes are from now on those in other directions from another origin."""
+    values = [[block.real(line, word) for word in words] for line, words in block.rows]
+    first, second = [*values, [], []][:2]
+    if len(first) not in (0, 3, 6) or len(second) not in (0, 3) or len(values) > 2:
+        raise block.fail("*SYSTEM needs three or six coordinates, and three more or none")
+    origin, turn = np.array(first[:3] or [0.0] * 3), Rotation.identity()
+    if len(first) == 6:
+        x = np.array(first[3:]) - origin
+        z = np.cross(x, np.array(second) - origin) if second else np.array([0.0, 0.0, 1.0])
+        x = x if second else x * [1, 1, 0]
+        if not np.any(x) or not np.any(z):
+            raise block.fail("the axes of *SYSTEM have no direction")
+        x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+        turn = Rotation.from_matrix(np.stack([x, np.cross(z, x), z], axis=1))
+    scope.frame = origin, turn
+
+
+def places(scope: Scope, block: Block, rows: list[list[float]]) -> np.ndarray:
+    """Places (n, 3) from coordinates, which may be those of a cylinder, in the frame."""
+    x = np.array(rows, dtype=float).reshape(-1, 3)
+    kind = block.options.get("system", "R").upper()
+    if kind == "C":
+        angle = np.radians(x[:, 1])
+        x[:, :2] = (x[:, 0] * [np.cos(angle), np.sin(angle)]).T
+    elif kind not in ("R", "RC"):
+        raise block.fail(f"coordinates of SYSTEM={kind} are not known here; write them as R")
+    origin, turn = scope.frame
+    return np.asarray(turn.apply(x) + origin if len(x) else x)
+
+
 def _whole(block: Block, line: int, words: list[str], defaults: list[int | None]) -> list[int]:
     """Whole numbers of a row; those that are left out have defaults."""
     if len(words) > len(defaults):
@@ -51,7 +83,7 @@ def _whole(block: Block, line: int, words: list[str], defaults: list[int | None]
 
 def _node(scope: Scope, block: Block, line: int, tag: int) -> np.ndarray:
     if tag not in scope.nodes:
-        raise block.fail(f"there is no node {tag}", line)
+        raise block.fail(f"there is no node {tag}", line, Later)
     return np.array(scope.nodes[tag])
 
 
@@ -59,9 +91,7 @@ def _put(scope: Scope, block: Block, tags: list[int], places: np.ndarray, name: 
     """Add nodes, to a set if it has a name."""
     if any(tag < 1 for tag in tags):
         raise block.fail("numbers of nodes begin with 1")
-    scope.nodes |= zip(tags, map(tuple, places.tolist()))
-    if name:
-        set_of(scope.node_sets, name).update(dict.fromkeys(tags))
+    scope.put(block, tags, places, name)
 
 
 def ngen(scope: Scope, block: Block) -> None:
@@ -136,14 +166,14 @@ def _in_order(scope: Scope, block: Block, line: int, word: str) -> list[int]:
 
 def ncopy(scope: Scope, block: Block) -> None:
     """Copies of nodes, moved or reflected."""
-    by = block.whole(block.line, block.need("changenumber"))
+    by = block.whole(block.place, block.need("changenumber"))
     old = list(scope.numbers(block.need("oldset"), "node_sets", block))
     if block.options.get("multiple", "1") != "1":
         raise block.fail("MULTIPLE of *NCOPY is not known here; write the nodes themselves")
     reflect = block.options.get("reflect", "").upper()
     if ("shift" in block.options) == bool(reflect):
         raise block.fail("*NCOPY needs either SHIFT or REFLECT=")
-    x = np.array([_node(scope, block, block.line, tag) for tag in old]).reshape(-1, 3)
+    x = np.array([_node(scope, block, block.place, tag) for tag in old]).reshape(-1, 3)
     if "shift" in block.options:
         places = motion(block, block.rows)(x)
     else:
@@ -170,13 +200,14 @@ def _reflected(block: Block, kind: str, x: np.ndarray) -> np.ndarray:
 
 def elgen(scope: Scope, block: Block) -> None:
     """Rows and layers of elements like one that is there."""
-    for line, words in block.rows:
+    while block.rows:
+        line, words = block.rows[0]
         usual: list[int | None] = [None, 1, 1, 1, 1, 1, 1, 1, 1, 1]
         master, *steps = _whole(block, line, words, usual)
         where = [(b, i) for b, (_, _, ids, _) in enumerate(scope.blocks) for i in _at(ids, master)]
         if not where or any(count < 1 for count in steps[::3]):
             what = f"there is no element {master}" if not where else "a count is below 1"
-            raise block.fail(what, line)
+            raise block.fail(what, line, InputError if where else Later)
         number, row = where[0]
         nodes, ids = scope.blocks[number][1][[row]], np.array([master])
         for count, by_nodes, by_ids in zip(steps[::3], steps[1::3], steps[2::3]):
@@ -186,6 +217,7 @@ def elgen(scope: Scope, block: Block) -> None:
         scope.append(scope.types[number], nodes[1:], ids[1:], [(block, line)] * (len(ids) - 1))
         if "elset" in block.options:
             set_of(scope.element_sets, block.need("elset")).update(dict.fromkeys(ids.tolist()))
+        block.rows.pop(0)  # what is done is not done again
 
 
 def _at(ids: np.ndarray, number: int) -> list[int]:
@@ -194,12 +226,12 @@ def _at(ids: np.ndarray, number: int) -> list[int]:
 
 def elcopy(scope: Scope, block: Block) -> None:
     """Copies of elements on other nodes."""
-    by, nodes_by = (block.whole(block.line, block.need(o)) for o in ("elementshift", "shiftnodes"))
-    old = np.fromiter(scope.numbers(block.need("oldset"), "element_sets", block), np.int64)
+    by, nodes_by = (block.whole(block.place, block.need(o)) for o in ("elementshift", "shiftnodes"))
+    old = np.fromiter(scope.there(block.need("oldset"), block), np.int64)
     for number, (_, nodes, ids, _) in enumerate(list(scope.blocks)):
         own = np.flatnonzero(np.isin(ids, old))
         if len(own):
-            where = [(block, block.line)] * len(own)
+            where = [(block, block.place)] * len(own)
             scope.append(scope.types[number], nodes[own] + nodes_by, ids[own] + by, where)
     if "newset" in block.options:
         made = set_of(scope.element_sets, block.need("newset"))

@@ -12,14 +12,17 @@ user's manual, "Input syntax rules".
 
 from __future__ import annotations
 
+import logging
+import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 from contactopt.errors import InputError
 
+log = logging.getLogger("contactopt.meshes.inp")
 # keywords that are read -> their options, without blanks
 READ = {
     "node": "nset system input",
@@ -42,31 +45,60 @@ SECTIONS = {
     *("shellsection", "shellgeneralsection", "solidsection"),
 }
 DEEPEST = 10  # files that include each other
-LARGEST = 2**31  # numbers of nodes and elements are smaller
+LARGEST = 2**31  # numbers of nodes, elements and lines are smaller
+FAR = 1e100  # larger coordinates have no volume in floating-point numbers
 COMMA = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')  # not within quotation marks
-Row = tuple[int, list[str]]  # line and words
+Row = tuple[int, list[str]]  # place of the line in Source, and words
+
+
+class Later(InputError):
+    """What a block needs is not there, but may stand below: the order of the data is free."""
+
+
+@dataclass
+class Source:
+    """The files of a deck: number i * LARGEST + n stands for line n of file i."""
+
+    files: list[Path]
+    depths: list[int]  # how many files include each
+
+    def open(self, path: Path, depth: int) -> list[tuple[int, str]]:
+        """The lines of another file, the last one first, by their numbers."""
+        self.files.append(path)
+        self.depths.append(depth)
+        first = (len(self.files) - 1) * LARGEST
+        return [(first + number, text) for number, text in _lines(path)]
+
+    def named(self, place: int) -> tuple[Path, int]:
+        return self.files[place // LARGEST], place % LARGEST
 
 
 @dataclass
 class Block:
     """A keyword line with its data.
 
+    source   the files of the deck;  place  of the keyword in it
     keyword  in lower case, without blanks;  options  value by name
-    rows     the rows of data, each with its line in `data`, the file that holds them
-    line     of the keyword in `path`
+    rows     the rows of data, each with its place
     """
 
-    path: Path
-    line: int
+    source: Source
+    place: int
     keyword: str
     options: dict[str, str]
     rows: list[Row] = field(default_factory=list)
-    data: Path = Path()
 
-    def fail(self, message: str, line: int | None = None) -> InputError:
-        """The error about the keyword, or about a line of its data."""
-        path, number = (self.path, self.line) if line is None else (self.data, line)
-        return InputError(f"mesh file '{path}', line {number}: {message}.")
+    def fail(
+        self, message: str, place: int | None = None, error: type[InputError] = InputError
+    ) -> InputError:
+        """The error about the keyword, or about a row of its data."""
+        path, line = self.source.named(self.place if place is None else place)
+        return error(f"mesh file '{path}', line {line}: {message}.")
+
+    def warn(self, message: str, *values: object) -> None:
+        """Warn of the keyword."""
+        path, line = self.source.named(self.place)
+        log.warning(f"%s, line %d: {message}", path, line, *values)
 
     def need(self, option: str) -> str:
         """The value of an option that must be there."""
@@ -74,53 +106,74 @@ class Block:
             raise self.fail(f"*{self.keyword.upper()} lacks the option {option.upper()}=")
         return self.options[option]
 
-    def whole(self, line: int, word: str) -> int:
+    def whole(self, place: int, word: str) -> int:
         """The number of a node or element, or a step between numbers."""
         if len(word) < 10 and word.isascii() and word.isdigit():
             return int(word)
         if re.fullmatch(r"[+-]?\d{1,10}", word, re.ASCII) and abs(int(word)) < LARGEST:
             return int(word)
-        raise self.fail(f"{word[:40]!r} is no whole number below {LARGEST}", line)
+        raise self.fail(f"{word[:40]!r} is no whole number below {LARGEST}", place)
 
-    def real(self, line: int, word: str) -> float:
+    def real(self, place: int, word: str) -> float:
         """A number; an exponent may be written with D, and an empty word is zero."""
         try:
-            return float(word.translate(_EXPONENT) or 0)
+            value = float(word.translate(_EXPONENT) or 0)
         except ValueError:
-            raise self.fail(f"{word[:40]!r} is no number", line) from None
+            value = math.nan
+        if not abs(value) < FAR:
+            why = "is no number" if math.isnan(value) else f"is not below {FAR:g}"
+            raise self.fail(f"{word[:40]!r} {why}", place)
+        return value
 
 
 Named = dict[int, tuple[Block, int] | None]  # numbers, each with where it is named if it must exist
 _EXPONENT = str.maketrans({"d": "e", "D": "e", "_": "?"})
 
 
-def blocks(path: Path, depth: int = 0) -> Iterator[Block]:
-    """The blocks of a file that are read, included files in their place.
+def blocks(path: Path) -> Iterator[Block]:
+    """The blocks of a file that are read, included files in the place of the lines that name them.
 
     ValueError for what is no such file; InputError with its line for what is not known.
     """
-    lines = _lines(path)
+    source = Source([], [])
+    lines = source.open(path, 0)
     block: Block | None = None
     stepping = False
     while lines:
-        number, text = lines.pop()
+        place, text = lines.pop()
         if not text.startswith("*"):
             if block is None:
                 raise ValueError("it does not begin with a keyword")
-            block.rows.append((number, _words(text)))
+            block.rows.append((place, _words(text)))
             continue
-        if block is not None:
-            yield from _known(block, stepping, depth)
-            stepping = block.keyword == "step" or (stepping and block.keyword != "endstep")
         while text.endswith(",") and lines and _goes_on(text, lines[-1][1]):
             text += lines.pop()[1]
         first, *words = _words(text[1:])
         pairs = (word.partition("=") for word in words if word)
         options = {bare(key): value.strip().strip('"').strip() for key, _, value in pairs}
-        block = Block(path, number, bare(first), options, data=path)
+        found = Block(source, place, bare(first), options)
+        if found.keyword == "include":  # its data may be those of the block before
+            lines += _other(found)
+            continue
+        if block is not None:
+            yield from _known(block, stepping)
+            stepping = block.keyword == "step" or (stepping and block.keyword != "endstep")
+        block = found
     if block is None:
         raise ValueError("it holds no keyword")
-    yield from _known(block, stepping, depth)
+    yield from _known(block, stepping)
+
+
+def _other(block: Block) -> list[tuple[int, str]]:
+    """The lines of the file that a keyword names, the last one first."""
+    _check_options(block)
+    name, source = block.need("input").replace("\\", "/"), block.source
+    path, depth = source.named(block.place)[0], source.depths[block.place // LARGEST] + 1
+    if depth > DEEPEST:
+        raise block.fail("files include each other without end")
+    if not (path.parent / name).is_file():
+        raise block.fail(f"there is no file '{name}' beside this one")
+    return source.open(path.parent / name, depth)
 
 
 def _goes_on(text: str, after: str) -> bool:
@@ -129,7 +182,7 @@ def _goes_on(text: str, after: str) -> bool:
     return not after.startswith("*") and option in READ.get(keyword, option).split()
 
 
-def _known(block: Block, stepping: bool, depth: int) -> Iterator[Block]:
+def _known(block: Block, stepping: bool) -> Iterator[Block]:
     """A block that is read, with the data of other files, or nothing for one without effect."""
     if block.keyword in SECTIONS:
         yield block
@@ -141,25 +194,19 @@ def _known(block: Block, stepping: bool, depth: int) -> Iterator[Block]:
                 " depend on it; write the mesh without it"
             )
         return
+    _check_options(block)
+    if "input" in block.options:
+        block.rows += [(place, _words(text)) for place, text in reversed(_other(block))]
+    yield block
+
+
+def _check_options(block: Block) -> None:
     for option in block.options:
         if option not in READ[block.keyword].split():
             raise block.fail(
                 f"the option {option.upper()} of *{block.keyword.upper()} is not known here; write"
                 " the mesh without it"
             )
-    if block.keyword == "include" or "input" in block.options:
-        name = block.need("input").replace("\\", "/")
-        other = block.path.parent / name
-        if depth >= DEEPEST:
-            raise block.fail("files include each other without end")
-        if not other.is_file():
-            raise block.fail(f"there is no file '{name}' beside this one")
-        if block.keyword == "include":
-            yield from blocks(other, depth + 1)
-            return
-        rows = [(number, _words(text)) for number, text in reversed(_lines(other))]
-        block = replace(block, rows=rows, data=other)
-    yield block
 
 
 @cache

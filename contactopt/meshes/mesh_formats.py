@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import io
 import pickle
-import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -26,7 +25,8 @@ from contactopt.meshes.bulk_data import read_bulk_data
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
 from contactopt.meshes.med import read_med
-from contactopt.meshes.msh4 import parametric, read_msh4, read_parametric, version
+from contactopt.meshes.medit import read_medit
+from contactopt.meshes.msh4 import parametric, read_msh4, read_parametric, version, without_views
 from contactopt.meshes.su2 import read_su2
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
@@ -42,10 +42,10 @@ OWN: dict[str, Callable[[Path], Any]] = {
     "abaqus": read_inp,
     "exodus": read_exodus,
     "med": read_med,
+    "medit": read_medit,
     "nastran": read_bulk_data,
     "su2": read_su2,
 }
-SECOND = re.compile(rb"\s*[A-Z][a-z]+[PQ][2-9]\s*$")  # keywords of Medit
 PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
 CHILD = """import contextlib, pickle, sys, meshio
@@ -169,8 +169,6 @@ def _read(path: Path) -> Any:
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[], Any]]:
     """The reader of each attempt."""
-    import meshio
-
     stated, binary = version(path) if "gmsh" in formats else (None, False)
     if stated is not None and stated != "4.1" and stated.partition(".")[0] != "2":
         raise InputError(
@@ -183,24 +181,24 @@ def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[],
     if stated is not None and parametric(path):
         yield partial(read_parametric, path)
         return
-    if binary:  # meshio trusts the counts of damaged files
-        yield partial(_read_apart, path, "gmsh", size)
+    if stated is not None:
+        with without_views(path) as bare:
+            # meshio trusts the counts of damaged binary files
+            yield partial(_read_apart if binary else _read_here, bare, "gmsh", size)
         return
-    if "medit" in formats:
-        with path.open("rb") as file:
-            curved = next((line.strip() for line in file if SECOND.match(line)), None)
-        if curved is not None:
-            raise InputError(
-                f"mesh file '{path}': elements of second order ({curved.decode()}) are not read"
-                " from this format; save it as .msh or .inp."
-            )
     for name in sorted(formats, key=lambda name: name not in SAFE):
-        if name in OWN:
+        if name in OWN and path.suffix != ".meshb":
             yield partial(OWN[name], path)
         elif name in SAFE:
-            yield partial(meshio.read, path, file_format=name)
+            yield partial(_read_here, path, name, size)
         else:
             yield partial(_read_apart, path, name, size)
+
+
+def _read_here(path: Path, name: str, size: int) -> Any:
+    import meshio
+
+    return meshio.read(path, file_format=name)
 
 
 def _read_apart(path: Path, name: str, size: int) -> Any:

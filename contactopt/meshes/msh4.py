@@ -11,11 +11,21 @@ Source: Gmsh reference manual, version 4.15, chapter "MSH file format".
 
 from __future__ import annotations
 
+import re
 import shlex
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+# sections of results: $NodeData ... $EndNodeData
+VIEWS = re.compile(
+    rb"^\$(NodeData|ElementData|ElementNodeData|InterpolationScheme)\b.*?^\$End\1\s*",
+    re.DOTALL | re.MULTILINE,
+)
 
 
 def version(path: Path) -> tuple[str | None, bool]:
@@ -35,6 +45,22 @@ def parametric(path: Path) -> bool:
     """Whether a file of version 2 has parametric nodes."""
     with path.open("rb") as file:
         return any(line.startswith(b"$ParametricNodes") for line in file)
+
+
+@contextmanager
+def without_views(path: Path) -> Iterator[Path]:
+    """A copy of a file of version 2 without the results in it, or the file if it has none. meshio
+    refuses those that are known at some nodes only.
+    """
+    data = path.read_bytes()
+    kept = VIEWS.sub(b"", data)
+    if len(kept) == len(data):
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        copy.write_bytes(kept)
+        yield copy
 
 
 def read_msh4(path: Path) -> Any:

@@ -95,7 +95,8 @@ class Auto(Method):
             problem = problem.altered(Q=problem.Q.toarray())
         swept = _Swept(sweeping, start)
         if not swept.tried:
-            yield from swept.points(constants.FIRST_SWEEPS, constants.SWEEPING)
+            first = constants.FIRST_SWEEPS, constants.FIRST_BETWEEN
+            yield from swept.points(*first, constants.SWEEPING)
         # asked only now, because a factorisation tells
         loose = sparse and not (problem.symmetric and definite(problem.Q))
         if loose:
@@ -131,7 +132,7 @@ class _Swept:
         first = problem.__dict__["swept"] if self.tried else (start or at_rest(problem))[0]
         self.r = np.array(first, order="C")
 
-    def points(self, most: int, budget: float) -> Iterator[Iterate]:
+    def points(self, most: int, between: int, budget: float) -> Iterator[Iterate]:
         """Points that `most` sweeps reach within a number of multiplications, if they converge: the
         second has all digits, and the first most of them where each sweep is expensive.
         """
@@ -144,7 +145,8 @@ class _Swept:
             return
         if not (NSGS().solves(problem.law) and Sweeps.can(problem)):
             return
-        sweeps, often = Sweeps(problem, constants.SWEEPS_KEPT), int(constants.MOMENT // cost) + 1
+        sweeps = Sweeps(problem, constants.SWEEPS_KEPT, between)
+        often = int(constants.MOMENT // cost) + 1
         done = self.reached(constants.NEARLY_SWEPT, sweeps, left, often)
         if not done:
             return
@@ -199,7 +201,7 @@ class _Robust:
                 reached = yield from self.proximal(
                     reached, 1, constants.LEAST_ALPHA, aim=residual / 2
                 )
-        yield from self.swept.points(constants.MORE_SWEEPS, np.inf)
+        yield from self.swept.points(constants.MORE_SWEEPS, constants.MORE_BETWEEN, np.inf)
         if self.conic:
             for full in (True, False):
                 path = interior_iterates(problem, self.matrix, Path(full))

@@ -15,7 +15,10 @@ FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 1000, 1e9
 LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
 QUICK = 2e5  # multiplications of a sweep up to which the first sweeps are one call
-SWEEPS_KEPT = 16  # last sweeps that the next one starts from
+SWEEPS_KEPT = 16  # last sweeps that one starts from which is accelerated
+# Sweeps between two of these after the first 50, in the first and in the second run: what goes
+# round in a circle with one number seldom does so with the other.
+FIRST_BETWEEN, MORE_BETWEEN = 5, 1
 NEARLY_SWEPT, SWEPT = 1e-7, 1e-13  # change of a sweep over the forces: most digits, all digits
 LOOK, MOMENT = 3e5, 1e8  # multiplications worth a certificate; between two looks at the clock
 NEWTON_STEPS = 25  # of Newton's method, whose last ones converge quadratically

@@ -51,6 +51,7 @@ FAR = 0.1  # residual above which a method that works for long may be at one wit
 DOUBT, DEARER = 3, 0.25  # iterates before the proof is first looked for, and more per unknown
 SAME = 1e-11  # relative distance at which two iterates are the same state
 log = logging.getLogger(__name__)
+USUAL = Auto()  # which solves every law
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
 LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
 CONFIRM = 8  # repeated states in a row of a method that goes nowhere
@@ -111,7 +112,7 @@ def solve(
     limits = _Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
         solution, swept = None, None
-        if chosen == Auto() and start is None and limits.usual:
+        if chosen == USUAL and start is None and limits.usual:
             solution, swept = solve_small(problem, tol)
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
@@ -124,6 +125,8 @@ def _method_for(
     problem: InterfaceProblem, method: str | Method | None, settings: Mapping[str, Any]
 ) -> Method:
     """The method object; InputError if it is none, or does not solve the problem's law."""
+    if method is None and not settings:
+        return USUAL
     if method is None or isinstance(method, str):
         method = find_method(method or default_method(settings), **settings)
     elif not callable(getattr(method, "iterate", None)):

@@ -23,10 +23,8 @@ from contactopt.problem.scaling import immovable
 # Contacts around a place that exchange forces, too: on quadratic elements an exchange falls to a
 # thousandth within three elements.
 NEAREST = 40
-TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
-GENERIC = np.sqrt([1.0, 2.0, 3.0])  # a direction that no lattice of contacts repeats
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 
 
@@ -34,10 +32,10 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
     """The solution with the least friction at every place where contacts can exchange forces, its
     certificate at most `tol`, and a note of a place where this leaves some, or several solutions.
     """
-    if not solution.solved:
+    if not solution.solved or not has_entries(problem.Q):
         return solution
     points = problem.coordinates.T
-    for at in places(problem):
+    for at in problem.shared_places:
         left = False
         far = np.linalg.norm(points - points[at[0]], axis=1)
         near = np.argsort(far, kind="stable")[:NEAREST]
@@ -60,22 +58,6 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
                 " change nothing else",
             )
     return solution
-
-
-def places(problem: InterfaceProblem) -> list[np.ndarray]:
-    """The contacts at every place that has several."""
-    points = problem.coordinates.T
-    if not has_entries(problem.Q) or len(points) != problem.contacts or problem.contacts < 2:
-        return []
-    near = TOGETHER * np.ptp(points, axis=0).max()
-    line = np.sort(points @ GENERIC[: points.shape[1]])  # no two points of a grid fall together
-    if np.min(line[1:] - line[:-1]) > GENERIC.sum() * near:
-        return []
-    cell = np.round(points / (near or 1.0))
-    own, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)[1:]
-    own = own.ravel()
-    order = np.argsort(own, kind="stable")
-    return [one for one in np.split(order, np.cumsum(counts)[:-1]) if len(one) > 1]
 
 
 def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
-"""Small problems of the default method in a few calls: the first sweeps of
-contactopt.methods.auto, compiled and in the units of the problem (`small` in kernels/sweeps.c), and
-the certificate. Sweeps need no scaling. What they do not solve goes on as without them, and so does
-everything where the package was installed without a compiler.
+"""Small problems of the default method in one call: the first sweeps of contactopt.methods.auto and
+the certificate, compiled and in the units of the problem (`certified` in kernels/sweeps.c). Sweeps
+need no scaling. What they do not solve goes on as without them, and so does everything where the
+package was installed without a compiler.
 """
 
 from __future__ import annotations
@@ -15,50 +15,63 @@ from contactopt.methods import constants
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels import gauss_seidel
 from contactopt.methods.notes import FEW
-from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
+from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.laws.coulomb import Coulomb
 
-NAME, NONE = repr(Auto()), np.zeros(0)
+NAME = repr(Auto())
 
 
 def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None, np.ndarray | None]:
-    """The certified solution; None and where the sweeps ended, or None twice where they were not
-    made.
-    """
-    Q, law = problem.Q, problem.law
-    compiled = gauss_seidel.compiled("small")
-    if compiled is None or not gauss_seidel.Sweeps.can(problem):
+    """The certified solution; or None, and where the sweeps ended, None if they were not made."""
+    begin = time.perf_counter()
+    if (given := arrays_of(problem)) is None:
         return None, None
-    if type(law) is not Coulomb or not problem.q.size:
-        return None, None
-    if form(Q) == "sparse":
-        rows = Q.indptr.astype(np.int64), Q.indices.astype(np.int64), Q.data
-    elif form(Q) == "array":
-        rows = gauss_seidel.NONE, gauss_seidel.NONE, Q
-    else:
-        return None, None
-    begin, (k, dim) = time.perf_counter(), problem.q.shape
-    cost = rows[2].size + constants.LOCAL * k
+    cost = given[1][2].size + constants.LOCAL * problem.contacts
     if cost > constants.QUICK:
         return None, None
     # all digits cost less than the condition of few contacts (contactopt.methods.notes)
-    look = np.inf if k <= FEW else constants.LOOK / cost
-    r = np.zeros((k, dim))
-    arrays = *(np.ascontiguousarray(a) for a in (rows[2], law.coefficient, problem.q)), r
-    given = dim, *rows[:2], *arrays, constants.SWEEPS_KEPT
-    nearly, swept = constants.NEARLY_SWEPT, constants.SWEPT
-    done, there = compiled(*given, constants.FIRST_SWEEPS, nearly, swept, look)
-    if not there:
-        return None, r
-    swept_at = time.perf_counter()
-    residual = natural_map_residual(problem, r, NONE)
-    if not residual <= tol and done > look:
-        compiled(*given, 2 * done, swept, swept, 0.0)
-        residual = natural_map_residual(problem, r, NONE)
+    look = np.inf if problem.contacts <= FEW else constants.LOOK / cost
+    residual, r = certified(given, constants.FIRST_SWEEPS, look, tol)
     if not residual <= tol:
-        return None, None
-    sweeping, certifying = swept_at - begin, time.perf_counter() - swept_at
-    phases = {"solve": sweeping, "certificate": certifying, "checks": 0.0}
-    row = {"residual": residual, "change": float(np.any(r[:, 1:])), "seconds": sweeping}
+        return None, r
+    seconds = time.perf_counter() - begin
+    phases = {"solve": seconds, "certificate": 0.0, "checks": 0.0}
+    row = {"residual": residual, "change": float(r[:, 1:].any()), "seconds": seconds}
     end = Status.SOLVED, residual, 1, NAME, (row,), phases, Status.SOLVED.sentence
     return Solution(r, np.zeros(0), *end), None
+
+
+def arrays_of(problem: InterfaceProblem) -> tuple[int, list[np.ndarray]] | None:
+    """What the compiled code takes of a problem: the dimension, Q by rows, friction and q. None
+    where it does not take it.
+    """
+    if type(problem.law) is not Coulomb or not problem.q.size or len(problem.s):
+        return None
+    kind, Q, none = form(problem.Q), problem.Q, gauss_seidel.NONE
+    if gauss_seidel.compiled("certified") is None or kind not in ("array", "sparse"):
+        return None
+    if kind == "sparse":
+        rows = Q.indptr.astype(np.int64), Q.indices.astype(np.int64), Q.data
+    else:
+        rows = none, none, np.ascontiguousarray(Q)
+    both = np.ascontiguousarray(problem.law.coefficient), np.ascontiguousarray(problem.q)
+    return problem.dim, [*rows, *both]
+
+
+def certified(
+    given: tuple[int, list[np.ndarray]],
+    most: int,
+    look: float,
+    tol: float,
+    r: np.ndarray | None = None,
+) -> tuple[float, np.ndarray]:
+    """The certificate after at most so many sweeps from forces r (k, dim), infinite where they do
+    not converge, and their forces. `look` is how many of them are worth a certificate of their own.
+    """
+    dim, arrays = given
+    r = np.zeros(arrays[-1].shape) if r is None else r.copy()
+    numbers = constants.NEARLY_SWEPT, constants.SWEPT, look, tol
+    kept = constants.SWEEPS_KEPT, constants.FIRST_BETWEEN
+    compiled = gauss_seidel.compiled("certified")
+    assert compiled is not None
+    return float(compiled(dim, *arrays, r, *kept, most, *numbers)), r

@@ -110,7 +110,7 @@ def natural_map_residual(
     multipliers: np.ndarray | None = None,
     moved: Moved | None = None,
 ) -> float:
-    """How far reactions are from a solution, dimensionless: the certificate, as in the head of this
+    """How far reactions are from a solution, dimensionless: the certificate, as at the top of this
     module.
 
     Parameters
@@ -157,7 +157,7 @@ def natural_map_residual(
 def yardsticks(
     problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray
 ) -> Yardsticks:
-    """Force F, length L and steps rho, as in the head of this module, for forces r and the finite
+    """Force F, length L and steps rho, as at the top of this module, for forces r and the finite
     displacements d = Q r and w = q + V lambda, all (k, dim).
     """
     size, gap = lengths(r), w[:, 0]

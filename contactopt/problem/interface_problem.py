@@ -45,11 +45,13 @@ from contactopt.problem.laws.law import Law
 
 # largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
 SYMMETRIC = 1e-2
+TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
+GENERIC = np.sqrt([1.0, 2.0, 3.0])  # a direction that no lattice of contacts repeats
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class InterfaceProblem:
-    """Contact at k nodes in `dim` dimensions, as in the head of this module.
+    """Contact at k nodes in `dim` dimensions, as at the top of this module.
 
     Q            (k dim, k dim) compliance [length / force]: an array, a scipy sparse matrix (kept
                  as csr_array), or an InterfaceOperator that knows it by its products only. Elastic
@@ -224,6 +226,23 @@ class InterfaceProblem:
     def gaps(self) -> np.ndarray:
         """(k,) lengths of q [length]."""
         return lengths(self.q)
+
+    @cached_property
+    def shared_places(self) -> list[np.ndarray]:
+        """The contacts at every place that has several."""
+        x = self.coordinates
+        if x.shape[1] != self.contacts or self.contacts < 2:
+            return []
+        near = TOGETHER * (x.max(axis=1) - x.min(axis=1)).max()
+        line = GENERIC[: len(x)] @ x  # no two points of a grid fall together
+        line.sort()
+        if (line[1:] - line[:-1]).min() > GENERIC.sum() * near:
+            return []
+        cell = np.round(x.T / (near or 1.0))
+        own, counts = np.unique(cell, axis=0, return_inverse=True, return_counts=True)[1:]
+        own = own.ravel()
+        order = np.argsort(own, kind="stable")
+        return [one for one in np.split(order, np.cumsum(counts)[:-1]) if len(one) > 1]
 
     @cached_property
     def reach(self) -> np.ndarray:

@@ -22,7 +22,7 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     Places are compared in space, so that the answer does not depend on how the bodies are turned or
     where a chart has its origin: along the polygon of the source's contacts in 2D, in the plane in
     which they extend most in 3D. Outside of the source's contacts the nearest one counts. The
-    multipliers are taken over.
+    multipliers are copied.
 
     Parameters
     ----------

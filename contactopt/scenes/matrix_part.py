@@ -38,7 +38,7 @@ SYMMETRIC = 1e-9  # largest |K - K'| over the largest |K|
 
 @dataclass(frozen=True, eq=False)
 class MatrixPart:
-    """An elastic body given by its stiffness K and loads f, as in the head of this module.
+    """An elastic body given by its stiffness K and loads f, as at the top of this module.
 
     K            (n, n) sparse or dense, without boundary conditions, n = dim N for N points; or a
                  function (n,) -> (n,) that solves K U = F, or an object with such a method `solve`,

@@ -52,7 +52,7 @@ FORM = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter by the parts of its name, as in the head of this module.
+    """One parameter by the parts of its name, as at the top of this module.
 
     owner  the name of a body or of a pair; empty for all of them
     """

@@ -77,11 +77,11 @@ class Simplified:
 
     given    the scene that was asked about
     scene    the scene after all simplifications that are exact, one after the other; the given one
-             if there are none. Where no proof was asked for, these are the simplifications that
-             await it
+             if there are none. If nothing was solved, these are the simplifications that
+             should be exact
     found    the simplifications; the exact ones come first, and each begins with the scene that the
              one before leaves. The others begin with `scene`
-    notes    sentences about what nearly was a simplification, and what spoils it
+    notes    sentences about what would be a simplification, and what prevents it
     """
 
     given: Scene
@@ -143,4 +143,6 @@ def _model(given: Scene, scene: Scene) -> str:
     return f"one {part} of {whole}" if part else whole
 
 
-Found = tuple[list[Simplification], list[str]]  # what was found, and sentences about what spoils it
+Found = tuple[
+    list[Simplification], list[str]
+]  # what was found, and sentences on what prevents more

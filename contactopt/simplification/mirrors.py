@@ -75,7 +75,7 @@ def _why(images: Images) -> str:
 
 
 def find_planes(whole: Whole) -> tuple[list[Plane], list[str]]:
-    """All planes of symmetry, and sentences about those that something else than meshes spoils."""
+    """All planes of symmetry, and sentences about those that something other than meshes spoils."""
     found: list[Plane] = []
     spoilt: dict[str, Plane] = {}  # by the reason
     for plane in _candidates(whole):

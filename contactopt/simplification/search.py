@@ -36,7 +36,7 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
 
     Raises
     ------
-    InputError : For something else than a scene, and for a scene that cannot be modelled.
+    InputError : For something other than a scene, and for a scene that cannot be modelled.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"the scene must be a Scene; got {type(scene).__name__}.")

@@ -67,7 +67,7 @@ class _Prism:
 
 
 def section(whole: Whole) -> tuple[list[Simplification], list[str]]:
-    """The section that stands for a solid, if there is one, or a sentence about what spoils it."""
+    """The section that stands for a solid, if there is one, or a sentence on what prevents it."""
     reasons = []
     for prism in _prisms(whole):
         reason, component = _spoils(prism), whole.scene.components[prism.axis]

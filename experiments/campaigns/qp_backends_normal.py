@@ -56,7 +56,7 @@ def times(table) -> str:  # type: ignore[no-untyped-def]
     mid = time_table(rows, metric="cpu_seconds").sort_values("shifted mean")
     fastest, others, own = mid.iloc[0], mid[mid["method"] != "auto"], mid[mid["method"] == "auto"]
     sentences = [
-        f"At 1e-6 the least shifted geometric mean CPU time is that of `{fastest['method']}`"
+        f"At 1e-6 the smallest shifted geometric mean CPU time is that of `{fastest['method']}`"
         f" ({1e3 * fastest['shifted mean']:.2g} ms)."
     ]
     if len(others) and others.iloc[0]["method"] != fastest["method"]:

@@ -44,7 +44,7 @@ def leaders(table) -> str:  # type: ignore[no-untyped-def]
     return (
         f"`auto` reaches the certificate 1e-6 on {int(auto['solved'])} of the {int(auto['of'])}"
         f" problems that all {len(leaders)} solvers take and some solver solves."
-    ) + ("" if unranked(table) else f" Its mean CPU time over them is {least} times the least.")
+    ) + ("" if unranked(table) else f" Its mean CPU time over them is {least} times the smallest.")
 
 
 def repeats(table) -> str:  # type: ignore[no-untyped-def]

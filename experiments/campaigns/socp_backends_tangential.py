@@ -41,7 +41,7 @@ def times(table) -> str:  # type: ignore[no-untyped-def]
     mid = time_table(rows, metric="cpu_seconds").sort_values("shifted mean")
     cone = mid[mid["method"].str.startswith("friction_socp")].iloc[0]
     return (
-        f"At 1e-6 `{mid.iloc[0]['method']}` has the least shifted geometric mean CPU time"
+        f"At 1e-6 `{mid.iloc[0]['method']}` has the smallest shifted geometric mean CPU time"
         f" ({1e3 * mid.iloc[0]['shifted mean']:.2g} ms). The best use of a conic backend is"
         f" `{cone['method']}`. It takes {cone['over the least']:.0f} times as long, with"
         " cvxpy's compilation."

@@ -73,7 +73,7 @@ for end in ((0, 2.2), (1.5, 1.9)):
         np.array([-(end[1] - 0.4), end[0]]) / np.hypot(end[0], end[1] - 0.4),
     )
     steps = np.linspace(0, 1, 13)[:, None]
-    zigzag = np.concatenate([[0], 0.09 * (-1.0) ** np.arange(11), [0]])[:, None]
+    zigzag = np.concatenate([[0], 0.13 * (-1.0) ** np.arange(11), [0]])[:, None]
     ax.plot(*([0, 0.4] + steps * way + zigzag * side).T, "C0", lw=1.5)
     ax.plot(*end, "ks", ms=8)
 ax.plot(0, 0.4, "o", ms=11, color="C0")

@@ -450,7 +450,7 @@ check("3.6", answer)
 # %% [markdown]
 # **3.7** (Think.) The ends of a string of 40 elements are at $d = 0.19$ mm. Its floor is raised to
 # a height $b$, so that $u_i \ge b$ while the ends stay. How large is the derivative of the minimum
-# of the energy by $b$, at $b = 0$?
+# of the energy with respect to $b$, at $b = 0$?
 
 # %% tags=["exercise"]
 answer = ...  # derivative of the energy [N]

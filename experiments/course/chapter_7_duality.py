@@ -316,8 +316,8 @@ answer = (..., ...)  # r_n, r_t [N]
 check("7.4", answer)
 
 # %% [markdown]
-# **7.5** (Program.) How large is the derivative of the minimum of $P$ by the friction bound $g$, at
-# $g = 0.83$ N? Which multiplier is it?
+# **7.5** (Program.) How large is the derivative of the minimum of $P$ with respect to the friction
+# bound $g$, at $g = 0.83$ N? Which multiplier is it?
 
 # %% tags=["exercise"]
 answer = ...  # derivative [mm]

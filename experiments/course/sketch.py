@@ -18,5 +18,13 @@ def arrow(
 ) -> None:
     """Draw an arrow, and its name at a place, by default beside its middle."""
     ax.annotate("", head, tail, arrowprops={"arrowstyle": style, "color": color, "lw": 1.8})
-    beside = (tail[0] + head[0]) / 2 + 0.07, (tail[1] + head[1]) / 2 + 0.09
-    ax.text(*(at or beside), name, color=color)
+    wide, high = abs(head[0] - tail[0]), abs(head[1] - tail[1])
+    place, offset = ((tail[0] + head[0]) / 2, (tail[1] + head[1]) / 2), (6.0, 0.0)  # beside
+    sides = {"ha": "left", "va": "center"}
+    if wide > 5 * high:  # above
+        offset, sides = (0.0, 3.0), {"ha": "center", "va": "bottom"}
+    elif high < 5 * wide:  # at the head
+        place = head
+    if at is not None:
+        place, offset, sides = at, (0.0, 0.0), {"ha": "left", "va": "baseline"}
+    ax.annotate(name, place, offset, textcoords="offset points", color=color, size=13, **sides)

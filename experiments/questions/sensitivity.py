@@ -241,7 +241,7 @@ def costs() -> list[dict[str, Any]]:
                 "contacts": problem.contacts,
                 "Newton steps": steps,
                 "whole solve [s]": whole,
-                "gradient by all data [s]": own,
+                "gradient with respect to all data [s]": own,
                 "anew [s]": anew,
                 "over the whole solve": own / whole,
                 "anew over the whole solve": anew / whole,

@@ -116,7 +116,12 @@ def page(number: int, notebooks: Path) -> str:
     whole = (
         Slide(one.title, f"Lecture {number} of {len(FILES)}\n\n{one.story}", one.story, None),
         *one.slides,
-        Slide("Until the next lecture", "\n".join(after), "", None),
+        Slide(
+            "Until the next lecture" if number < len(FILES) else "Now you",
+            "\n".join(after),
+            "",
+            None,
+        ),
     )
     mathjax = Path(str(find_spec("sphinx-mathjax-offline").submodule_search_locations[0]))
     script = (mathjax / "static" / "mathjax" / "tex-svg.js").read_text()

@@ -201,7 +201,7 @@ ax.set_xticks(best.columns + 1, [f"{int(n) + 1}" for n in best.columns])
 ax.minorticks_off()
 ax.set(
     xlabel="contacts [-]",
-    ylabel="time to a certificate of 1e-8 [ms], best of two",
+    ylabel="time to certificate 1e-8 [ms]",
 )
 ax.legend(frameon=False, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 

@@ -2,10 +2,11 @@
 with a compiler.
 
 The formulas are those of contactopt.methods.nsgs, which does the same in Python, much more slowly.
-Sweeps may be accelerated: each then starts from the combination of the last results whose changes
-would cancel best (Anderson's acceleration).
+Sweeps may be accelerated: some of them then start from the combination of the last results whose
+changes would cancel best (Anderson's acceleration).
 
-Source: Walker, Ni (2011), Anderson acceleration for fixed-point iterations.
+Sources: Walker, Ni (2011), Anderson acceleration for fixed-point iterations; Pratapa,
+Suryanarayana, Pask (2016) for the steps between.
 """
 
 from __future__ import annotations
@@ -33,18 +34,20 @@ def compiled(name: str) -> Callable[..., Any] | None:
 class Sweeps:
     """Sweeps over the contacts of a problem without plates, whose Q is an array or sparse.
 
-    memory  number of last sweeps that the next one starts from, at most 32; 0: not accelerated
+    memory   number of last sweeps that one starts from, at most 32; 0: not accelerated
+    between  number of sweeps between two that do so, after the first 50
     """
 
-    def __init__(self, problem: InterfaceProblem, memory: int = 0):
+    def __init__(self, problem: InterfaceProblem, memory: int = 0, between: int = 1):
         Q, (k, dim) = problem.Q, problem.q.shape
         rows = (Q.indptr, Q.indices, Q.data) if form(Q) == "sparse" else (NONE, NONE, np.asarray(Q))
         both = (problem.law.lowest != 0).astype(np.uint8)
         places = [np.ascontiguousarray(place, dtype=np.int64) for place in rows[:2]]
         reals = [np.ascontiguousarray(array, float) for array in (rows[2], problem.mu)]
-        work = np.zeros(4 + memory**2 + 2 * (memory + 1) * k * dim)
+        work = np.zeros(5 + memory**2 + 2 * (memory + 1) * k * dim)
         q = np.ascontiguousarray(problem.q, float)
         self.fixed = dim, *places, *reals, both, q, work, memory
+        self.between = between
 
     @staticmethod
     def can(problem: InterfaceProblem) -> bool:
@@ -58,5 +61,5 @@ class Sweeps:
         local change, until a sweep changes less than `enough` of the forces. Returns the change of
         the last sweep over the forces, and the number of sweeps.
         """
-        change, done = sweeps.sweep(*self.fixed, r, count, share, enough)
+        change, done = sweeps.sweep(*self.fixed, r, count, share, enough, self.between)
         return float(change), int(done)

@@ -17,6 +17,7 @@ columns[place]. An array has no such places. */
 #define STEPS 60
 #define LONGEST 32   /* sweeps that may be remembered */
 #define GROWN 2.0    /* a change so many times the least so far ends what is remembered */
+#define EASY 50       /* sweeps of which each may be accelerated */
 #define LITTLE 1e-13 /* of the identity, beside products of unit vectors */
 
 typedef struct {
@@ -161,34 +162,33 @@ static double dot(const double *a, const double *b, Py_ssize_t n)
     return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-/* v += what all contacts but i move contact i by. */
-static void add_motion(int dim, Py_ssize_t i, const Matrix *Q, const double *force, double *v)
+/* Row i of Q times x, its sum in four parts, too. */
+static double row_times(const Matrix *Q, Py_ssize_t n, Py_ssize_t i, const double *x)
 {
-    Py_ssize_t n = Q->k * dim, own = i * dim;
-    for (int a = 0; a < dim; a++) {
-        double sum = 0.0;
-        if (Q->first == NULL) {
-            const double *row = Q->entries + (own + a) * n;
-            sum = dot(row, force, own) + dot(row + own + dim, force + own + dim, n - own - dim);
-        }
-        else
-            for (int64_t place = Q->first[own + a]; place < Q->first[own + a + 1]; place++) {
-                int64_t column = Q->columns[place];
-                if (column < own || column >= own + dim)
-                    sum += Q->entries[place] * force[column];
-            }
-        v[a] += sum;
-    }
+    if (Q->first == NULL)
+        return dot(Q->entries + i * n, x, n);
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    int64_t place = Q->first[i], end = Q->first[i + 1];
+    for (; place + 4 <= end; place += 4)
+        for (int j = 0; j < 4; j++)
+            sum[j] += Q->entries[place + j] * x[Q->columns[place + j]];
+    for (; place < end; place++)
+        sum[0] += Q->entries[place] * x[Q->columns[place]];
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
 }
 
-/* One sweep, from r to its values after it. */
-static void sweep_once(int dim, double share, const Matrix *Q, const double *q, Local *at, double *r)
+/* One sweep, from r to its values after it. A contact is moved by all others: its own force is zero
+meanwhile. */
+static void sweep_once(int dim, double share, const Matrix *Q, const double *q, Local *at,
+                       double *r)
 {
+    Py_ssize_t n = Q->k * dim;
     for (Py_ssize_t i = 0; i < Q->k; i++) {
         double v[3], old[3], *mine = r + i * dim;
         for (int a = 0; a < dim; a++)
-            v[a] = q[i * dim + a], old[a] = mine[a];
-        add_motion(dim, i, Q, r, v);
+            old[a] = mine[a], mine[a] = 0.0;
+        for (int a = 0; a < dim; a++)
+            v[a] = q[i * dim + a] + row_times(Q, n, i * dim + a, r);
         solve_local(dim, at + i, v, mine);
         if (share != 1.0)
             relax(dim, at + i, share, old, mine);
@@ -197,24 +197,25 @@ static void sweep_once(int dim, double share, const Matrix *Q, const double *q, 
 
 /* What Anderson's acceleration remembers, all of it in one array of the caller. Of the last sweeps:
 the differences `moves` of their results and `changes` of their changes f, both over the norm of the
-latter, and the products of these with each other. */
+latter, and the products of these with each other. After the first sweeps, a number of them `between`
+two extrapolations finds the states of the contacts that fit; `since` counts them. */
 typedef struct {
-    double *used, *next, *started, *best, *products, *moves, *changes, *result, *change;
-    int most;
+    double *used, *next, *started, *best, *since, *products, *moves, *changes, *result, *change;
+    int most, between;
     Py_ssize_t n;
 } Memory;
 
-static Memory memory_in(double *work, int most, Py_ssize_t n)
+static Memory memory_in(double *work, int most, int between, Py_ssize_t n)
 {
-    double *products = work + 4, *moves = products + most * most, *changes = moves + most * n;
+    double *products = work + 5, *moves = products + most * most, *changes = moves + most * n;
     double *result = changes + most * n;
-    return (Memory){work, work + 1, work + 2, work + 3, products, moves, changes,
-                    result, result + n, most, n};
+    return (Memory){work, work + 1, work + 2, work + 3, work + 4, products, moves,
+                    changes, result, result + n, most, between, n};
 }
 
 static Py_ssize_t work_of(int most, Py_ssize_t n)
 {
-    return most ? 4 + most * most + 2 * (most + 1) * n : 0;
+    return most ? 5 + most * most + 2 * (most + 1) * n : 0;
 }
 
 static void forget(Memory *past)
@@ -253,6 +254,7 @@ static void remember(Memory *past, const double *r, const double *f)
     memcpy(past->result, r, n * sizeof(double));
     memcpy(past->change, f, n * sizeof(double));
     *past->started = 1.0;
+    *past->since += 1.0;
 }
 
 /* r, from the combination of the last results whose changes would add up to the least. Their least
@@ -260,6 +262,7 @@ squares are solved by Cholesky factors of the products, with a little of the ide
 static void extrapolate(Memory *past, double *r)
 {
     int used = (int)*past->used, most = past->most;
+    *past->since = 0.0;
     double L[LONGEST][LONGEST], c[LONGEST];
     for (int i = 0; i < used; i++) {
         for (int j = 0; j <= i; j++) {
@@ -296,7 +299,7 @@ static double sweep_over(int dim, Py_ssize_t *count, double share, double enough
     double change = INFINITY;
     Py_ssize_t n = Q->k * dim, done = 0;
     while (done < *count && change > enough) {
-        if (past->most)
+        if (past->most && (done < EASY || *past->since >= past->between))
             extrapolate(past, r);
         memcpy(f, r, n * sizeof(double));
         sweep_once(dim, share, Q, q, at, r);
@@ -314,12 +317,12 @@ static double sweep_over(int dim, Py_ssize_t *count, double share, double enough
 
 static PyObject *sweep(PyObject *self, PyObject *args)
 {
-    int dim, most;
+    int dim, most, between = 1;
     Py_ssize_t count;
     double share, enough, change = 0.0;
     Py_buffer first, columns, entries, mu, bilateral, q, work, r;
-    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*y*w*iw*ndd", &dim, &first, &columns, &entries, &mu,
-                          &bilateral, &q, &work, &most, &r, &count, &share, &enough))
+    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*y*w*iw*ndd|i", &dim, &first, &columns, &entries, &mu,
+                          &bilateral, &q, &work, &most, &r, &count, &share, &enough, &between))
         return NULL;
     Matrix Q = {entries.buf, first.len ? first.buf : NULL, columns.buf,
                 mu.len / (Py_ssize_t)sizeof(double)};
@@ -327,7 +330,7 @@ static PyObject *sweep(PyObject *self, PyObject *args)
     Local *at = fits ? malloc((Q.k ? Q.k : 1) * (sizeof(Local) + dim * sizeof(double))) : NULL;
     if (at != NULL) {
         Py_BEGIN_ALLOW_THREADS;
-        Memory past = memory_in(work.buf, most, Q.k * dim);
+        Memory past = memory_in(work.buf, most, between, Q.k * dim);
         for (Py_ssize_t i = 0; i < Q.k; i++) {
             double W[9] = {0.0};
             own_block(dim, i, &Q, W);
@@ -356,6 +359,17 @@ static double row_size(const Matrix *Q, Py_ssize_t n, Py_ssize_t i)
     return most;
 }
 
+/* The mean positive diagonal of a block, or 0; `highest` is the largest diagonal entry. */
+static double compliance_of(int dim, const double *diag, double highest)
+{
+    double total = 0.0;
+    int counted = 0;
+    for (int a = 0; a < dim; a++)
+        if (diag[a] > NOISE * highest)
+            total += diag[a], counted++;
+    return total / (counted ? counted : 1);
+}
+
 /* Local problems of Coulomb's law, as contactopt.problem.scaling has them: a component that nothing
 moves gets the mean compliance, so that it bears no force. diag (n,) is room. */
 static void prepare(int dim, const Matrix *Q, const double *q, const double *mu, double *diag,
@@ -382,40 +396,129 @@ static void prepare(int dim, const Matrix *Q, const double *q, const double *mu,
     }
 }
 
-static PyObject *small(PyObject *self, PyObject *args)
+/* Numbers of contactopt.problem.certificate. */
+#define ACTS 1e-6
+#define ROUNDED 1e-6
+#define DUST 1e-5
+#define ROUNDING DBL_EPSILON
+#define UNSEEN 1e4
+#define STIFFEST 1e4
+
+static double length_of(const double *v, int d)
 {
-    int dim, most;
+    return d == 1   ? fabs(v[0])
+           : d == 2 ? sqrt(v[0] * v[0] + v[1] * v[1])
+                    : sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* The least length of u = d + q where a contact bears force or overlaps; 0 without any. */
+static double least_displacement(int dim, Py_ssize_t k, const double *r, const double *d,
+                                 const double *q)
+{
+    double least = INFINITY;
+    for (Py_ssize_t i = 0; i < k * dim; i += dim) {
+        double u[3];
+        for (int a = 0; a < dim; a++)
+            u[a] = d[i + a] + q[i + a];
+        double size = length_of(u, dim);
+        if ((length_of(r + i, dim) > 0 || u[0] < 0) && size > 0)
+            least = fmin(least, size);
+    }
+    return isfinite(least) ? least : 0.0;
+}
+
+/* The certificate of contactopt.problem.certificate, in the letters of its head, without plates and
+for Coulomb's law. diag (n,) is that of Q; d (n,) is room for Q r. */
+static double certificate(int dim, const Matrix *Q, const double *q, const double *mu,
+                          const double *diag, const double *r, double *d)
+{
+    Py_ssize_t k = Q->k, n = k * dim;
+    double F0 = 0.0, L = 0.0, narrow = INFINITY, overlap = -INFINITY, highest = 0.0, worst = 0.0;
+    double size = 0.0, work = 0.0, movable = 0.0, stiffness = 0.0;
+    for (Py_ssize_t i = 0; i < n; i++) {
+        d[i] = row_times(Q, n, i, r);
+        if (!isfinite(r[i]) || !isfinite(d[i]))
+            return INFINITY;
+        highest = fmax(highest, diag[i]);
+    }
+    for (Py_ssize_t i = 0; i < n; i += dim)
+        F0 = fmax(F0, length_of(r + i, dim));
+    for (Py_ssize_t i = 0; i < n; i += dim) {
+        double bears = length_of(r + i, dim), c = compliance_of(dim, diag + i, highest);
+        double weight = F0 > 0 ? fmin(1.0, bears / (ACTS * F0)) : 0.0;
+        L = fmax(L, weight * fmax(length_of(d + i, dim), ROUNDED * length_of(q + i, dim)));
+        narrow = fmin(narrow, fabs(q[i])), overlap = fmax(overlap, -q[i]);
+        work += bears * c, stiffness += c;
+        size += c > 0 ? bears : 0.0, movable += c > 0;
+    }
+    L = fmax(L, fmax(narrow, overlap));
+    double mean = size > 0 ? work / size : movable > 0 ? stiffness / movable : 0.0;
+    if (L == 0)
+        L = least_displacement(dim, k, r, d, q);
+    double natural = mean > 0 ? L / mean : 0.0;
+    double F = natural > 0 ? fmax(fmin(F0, natural), DUST * natural) : F0;
+    F = F == 0 ? 1.0 : F;
+    for (Py_ssize_t i = 0; i < n; i += dim) {
+        double c = compliance_of(dim, diag + i, highest), y[3], error[3];
+        double stiff = fmin(fmax(c > 0 ? mean / c : 0.0, 1.0), STIFFEST);
+        double rho = L == 0 ? 0.0 : stiff * (F / L);
+        for (int a = 0; a < dim; a++)
+            y[a] = r[i + a] - rho * (d[i + a] + q[i + a]);
+        double bound = mu[i / dim] * fmax(y[0], 0.0), slip = length_of(y + 1, dim - 1);
+        double shrink = slip > bound ? bound / slip : 1.0;
+        error[0] = r[i] - fmax(y[0], 0.0);
+        for (int a = 1; a < dim; a++)
+            error[a] = r[i + a] - y[a] * shrink;
+        double off = length_of(error, dim) / F;
+        double beyond = (length_of(r + i + 1, dim - 1) - mu[i / dim] * fmax(r[i], 0.0)) / F;
+        if (!isfinite(off) || !isfinite(beyond))
+            return INFINITY;
+        worst = fmax(worst, fmax(off, beyond));
+    }
+    worst = fmax(worst, F0 / F > UNSEEN ? ROUNDING * (F0 / F) : 0.0);
+    return isfinite(worst) ? worst : INFINITY;
+}
+
+static PyObject *certified(PyObject *self, PyObject *args)
+{
+    int dim, most, between;
     Py_ssize_t count, more;
-    double nearly, swept, look, change = INFINITY;
+    double nearly, swept, look, tol, change = INFINITY, residual = INFINITY;
     Py_buffer first, columns, entries, mu, q, r;
-    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*w*inddd", &dim, &first, &columns, &entries, &mu, &q,
-                          &r, &most, &count, &nearly, &swept, &look))
+    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*w*iindddd", &dim, &first, &columns, &entries, &mu, &q,
+                          &r, &most, &between, &count, &nearly, &swept, &look, &tol))
         return NULL;
     Py_ssize_t k = mu.len / (Py_ssize_t)sizeof(double), n = k * dim;
     Matrix Q = {entries.buf, first.len ? first.buf : NULL, columns.buf, k};
-    double *room = most > LONGEST ? NULL : calloc(2 * n + work_of(most, n) + 1, sizeof(double));
+    double *room = most > LONGEST ? NULL : calloc(3 * n + work_of(most, n) + 1, sizeof(double));
     Local *at = room ? malloc((k ? k : 1) * sizeof(Local)) : NULL;
     if (at != NULL) {
         Py_BEGIN_ALLOW_THREADS;
-        Memory past = memory_in(room + 2 * n, most, n);
-        prepare(dim, &Q, q.buf, mu.buf, room + n, at);
-        change = sweep_over(dim, &count, 1.0, nearly, &Q, q.buf, at, r.buf, room, &past);
-        if (change <= nearly && count <= look) {
+        double *f = room, *d = room + n, *diag = room + 2 * n;
+        Memory past = memory_in(room + 3 * n, most, between, n);
+        prepare(dim, &Q, q.buf, mu.buf, diag, at);
+        change = sweep_over(dim, &count, 1.0, nearly, &Q, q.buf, at, r.buf, f, &past);
+        if (change <= nearly && count > look)
+            residual = certificate(dim, &Q, q.buf, mu.buf, diag, r.buf, d);
+        if (change <= nearly && !(residual <= tol)) {
             more = 2 * count; /* the last digits take less than the first */
-            sweep_over(dim, &more, 1.0, swept, &Q, q.buf, at, r.buf, room, &past);
+            sweep_over(dim, &more, 1.0, swept, &Q, q.buf, at, r.buf, f, &past);
+            residual = certificate(dim, &Q, q.buf, mu.buf, diag, r.buf, d);
         }
+        if (count == 0)
+            residual = certificate(dim, &Q, q.buf, mu.buf, diag, r.buf, d);
         Py_END_ALLOW_THREADS;
     }
     free(room), free(at);
     PyBuffer_Release(&first), PyBuffer_Release(&columns), PyBuffer_Release(&entries);
     PyBuffer_Release(&mu), PyBuffer_Release(&q), PyBuffer_Release(&r);
-    PyObject *there = change <= nearly ? Py_True : Py_False;
-    return at == NULL ? PyErr_NoMemory() : Py_BuildValue("nO", count, there);
+    return at == NULL ? PyErr_NoMemory() : PyFloat_FromDouble(residual);
 }
 
 static PyMethodDef functions[] = {
-    {"small", small, METH_VARARGS, "Sweep a problem in any units until most digits are there, and if"
-     " this takes at most `look` sweeps all; the number of the first ones, and whether it is so."},
+    {"certified", certified, METH_VARARGS, "Sweep a problem in any units until most digits are there,"
+     " and, unless the certificate is good then (`look`: sweeps that are worth one), all; the"
+     " certificate, infinite where they do not converge. Without sweeps, that of r."},
     {"sweep", sweep, METH_VARARGS,
      "Sweep at most `count` times over all contacts; the last change over the forces, the sweeps."},
     {NULL, NULL, 0, NULL}};

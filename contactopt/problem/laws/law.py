@@ -154,7 +154,7 @@ class Law:
         a law that does not know them.
         """
         raise InputError(
-            f"the law {type(self).__name__} has no derivative by its parameter"
+            f"the law {type(self).__name__} has no derivative with respect to its parameter"
             " (project_by_parameter)."
         )
 

@@ -47,7 +47,7 @@ MOST = 60  # steps of Newton's method for the projection on an ellipse; it takes
 
 @dataclass(frozen=True, eq=False)
 class Orthotropic(Law):
-    """Coulomb friction with two coefficients, as in the head of this module.
+    """Coulomb friction with two coefficients, as at the top of this module.
 
     mu_1, mu_2  (k,) friction coefficients along the two axes of friction; both positive or both 0
     angle       (k,) from the first tangential axis of the contact frame to the first axis of

@@ -169,8 +169,8 @@ def numbers(case: Case) -> str:
     def text(x: np.ndarray) -> str:
         return f"`{np.array2string(x, separator=', ', precision=6)}`".replace("\n", "")
 
-    (k, dim), where = case.q.shape, {2: "plane", 3: "space"}
-    said = f"{count(k, 'contact')} in the {where[dim]}, mu = {case.mu.max():g}, Q = {text(case.Q)}"
+    (k, dim), where = case.q.shape, {2: "the plane", 3: "three dimensions"}
+    said = f"{count(k, 'contact')} in {where[dim]}, mu = {case.mu.max():g}, Q = {text(case.Q)}"
     said += f", q = {text(case.q)}"
     if len(case.s):
         said += f", a plate with V = {text(case.V.ravel())} and s = {text(case.s)}"

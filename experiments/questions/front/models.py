@@ -106,7 +106,7 @@ def sheared_plane() -> Scene:
 
 
 def cattaneo() -> list[Model]:
-    """Two like cylinders, pressed and then sheared."""
+    """two equal cylinders, pressed and then sheared."""
     own = scenes.cattaneo(2, size=1000 * scenes.cattaneo(2).reference.half_width)
     small = scenes.cattaneo(2, size=SMALL * own.reference.half_width)
     plain, name = lambda: own, "Cattaneo"
