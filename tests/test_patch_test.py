@@ -140,7 +140,7 @@ def test_a_node_on_a_support_sees_the_face_that_it_lies_on(law):
 
 def test_matching_that_was_asked_for_fails_with_the_place_and_the_number():
     scene = cubes(("mirrored", "tetrahedra"), coupling="matching")
-    said = "coupled by matching: a constant pressure gives body 'upper' wrong forces, by 0.4"
+    said = "coupled by matching: a constant pressure gives body 'upper' wrong forces near"
     assert any(said in text for text in run(scene, figures=()).summary["remarks"])
     checked = check_scene([scene])
     assert any(said in note for note in checked.notes)

@@ -76,7 +76,10 @@ class Coupling:
                   where the other surface ends; None: all of them
     conforming    whether the facets of both sides have the same contacts at their corners
     why           why surfaces are coupled in this way; empty where this way was asked for
-    remarks       sentences for the reader on what this coupling cannot do well
+    tight         (k,) contacts of a tie at which others join its bodies, too, and which it could
+                  not give up (contactopt.coupling.crosspoints); None: nowhere
+    doubt         a sentence for the reader where the carrier does not suit the bodies, or empty
+    fails         a sentence for the reader where the coupling fails the patch test, or empty
     """
 
     upper: sp.csr_matrix
@@ -93,7 +96,14 @@ class Coupling:
     share: np.ndarray | None = None
     conforming: bool = False
     why: str = ""
-    remarks: tuple[str, ...] = ()
+    tight: np.ndarray | None = None
+    doubt: str = ""
+    fails: str = ""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences for the reader on what this coupling cannot do well."""
+        return tuple(text for text in (self.doubt, self.fails) if text)
 
 
 def couple(
@@ -121,9 +131,9 @@ def couple(
                 raise
             why = str(error).partition(";")[0]
         else:
-            if way == ways[-1] or not made.remarks:
+            if way == ways[-1] or not made.fails:
                 break
-            why = f"the nodes match, but {made.remarks[0].partition(': ')[2]}"
+            why = f"the nodes match, but {made.fails.partition(': ')[2].partition(';')[0]}"
     if made.kind != ways[0]:
         log.info("contact '%s' is coupled by %s: %s", pair.name, made.kind, why)
     if made.share is not None and (ends := np.count_nonzero(made.share < COVERED)):
@@ -136,20 +146,22 @@ def couple(
 
 def tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, AssembledBody]) -> Coupling:
     """The contract of every coupling: a constant pressure gives both sides their consistent nodal
-    forces. Where it does not, a remark says so.
+    forces. Where it does not, `fails` says so.
     """
     surfaces = tuple(
         body.surface(name) if body.meshed else None for body, name in zip(bodies, pair.surfaces)
     )
     if (found := misfit(made, surfaces)) is None:
-        return made
+        return replace(made, fails="") if made.fails else made
     where = place_words(found.place)
+    instead = "coupling = 'mortar'" if made.kind == "matching" else "nodes that match"
     said = (
         f"contact '{pair.name}', coupled by {made.kind}: a constant pressure gives body"
-        f" '{bodies[found.side].name}' wrong forces, by {found.error:.2g} of a node's near"
-        f" ({where})"
+        f" '{bodies[found.side].name}' wrong forces near ({where}), by {found.error:.0%} at a node;"
+        f" pressures and stresses around it may be wrong by as much: take {instead} there, or"
+        " refine the meshes."
     )
-    return replace(made, remarks=(*made.remarks, said))
+    return replace(made, fails=said)
 
 
 def _kind(name: str) -> Callable[..., Coupling]:

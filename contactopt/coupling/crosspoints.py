@@ -20,7 +20,8 @@ Which contacts give up:
    through further bodies. A chain of contacts that have nodes in common shows that. What a support
    holds is joined to the rigid bodies that do not move.
 
-A tie that keeps fewer contacts than hold a body gives up none of them; a remark names it.
+A tie that keeps fewer contacts than hold a body gives up none of them. Their forces may alternate
+then, which contactopt.readings.resolution looks for in the solution.
 
 Sources: Bernardi, Maday, Patera (1994), A new nonconforming approach to domain decomposition: the
 mortar element method, in: Nonlinear partial differential equations and their applications, Pitman,
@@ -44,7 +45,6 @@ import scipy.sparse as sp
 from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody
-from contactopt.checks import place_words
 from contactopt.coupling.coupling import Coupling
 from contactopt.meshes.cells import joined
 from contactopt.scenes.contact import Contact
@@ -58,8 +58,8 @@ FLAT = 1e-6  # points are on one line within this fraction of their extent
 def independent(
     pairs: Sequence[Contact], couplings: Sequence[Coupling], bodies: Iterable[AssembledBody]
 ) -> tuple[Coupling, ...]:
-    """The couplings of pairs of surfaces of bodies, of which ties gave up contacts at cross-points;
-    a remark is on those that could not.
+    """The couplings of pairs of surfaces of bodies, of which ties gave up contacts at cross-points,
+    or know which they could not.
     """
     tied = [number for number, pair in enumerate(pairs) if pair.law == "tied"]
     if not tied:
@@ -83,18 +83,12 @@ def independent(
 
 def _reduced(tie: _Seam, given: np.ndarray) -> Coupling:
     """The coupling of a tie whose contacts `given` give up, unless it keeps too few."""
-    kept, remarks = tie.left.copy(), tie.made.remarks
+    kept = tie.left.copy()
     kept[given] = False
+    made = tie.made
     if not tie.holds(kept):
-        kept = tie.left
-        where = place_words(tie.made.positions[:, given[0]])
-        remarks += (
-            f"the tie '{tie.pair.name}' has too few contacts to give one up where others join its"
-            f" bodies too, near ({where}): the forces near its edge are not reliable; refine the"
-            " meshes along it.",
-        )
-    made = tie.made if kept.all() or not kept.any() else _without(tie.made, kept)
-    return replace(made, remarks=remarks)
+        kept, made = tie.left, replace(made, tight=~kept & tie.left)
+    return made if kept.all() or not kept.any() else _without(made, kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,7 +322,8 @@ def _without(made: Coupling, kept: np.ndarray) -> Coupling:
         positions=made.positions[:, number],
         chart=replace(chart, places=chart.places[:, number], cells=cells, grid=None),
         cells=left(made.cells),
-        share=None if made.share is None else made.share[number],
+        share=None if made.share is None else 1 / (M @ (1 / made.share)),  # of all faces
+        tight=None if made.tight is None else made.tight[number],
     )
 
 

@@ -189,10 +189,10 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
         where = place_words(sums.nearest)
         said = "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)"
         _log.warning(said, upper.name, lower.name, -sums.least, where)
-    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, nodes, normals)
+    weights, alone = (sums.own, sums.other), _alone(mine, theirs, points, nodes, x, normals)
     if first == 1:
         weights, alone = weights[::-1], alone[::-1]
-    share = sums.areas / full[nodes]
+    share = sums.areas / sums.full
     return Mortar(first, nodes, sums.areas, n, gap, x, share, weights, alone, lever, carried)
 
 
@@ -255,12 +255,18 @@ def _centres(surface: Faces) -> np.ndarray:
 
 
 def _alone(
-    own: Faces, other: Faces, points: Overlap, nodes: np.ndarray, normals: np.ndarray
+    own: Faces,
+    other: Faces,
+    points: Overlap,
+    nodes: np.ndarray,
+    x: np.ndarray,
+    normals: np.ndarray,
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The own node of every contact, and the other side's shape functions on its normal."""
+    """The own node of every contact, and the other side's shape functions on the normal through
+    its place x (dim, k).
+    """
     k = len(nodes)
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
-    x = own.points[:, nodes]
     # a point on the faces of the node itself: at a corner others are as near
     inward = NUDGE * (_centres(own)[:, nodes] - x)
     places = own.locations(points.cell // len(own.cells), points.at)[0]
@@ -271,7 +277,7 @@ def _alone(
     there, off = _on_face(other, face, x, axes, points.there[:, near])
     # The face of the nearest point of integration need not be the one that the node sees.
     around = other.around()
-    lost = np.flatnonzero(off > NEWTON)
+    lost = np.flatnonzero(off > 0)
     beside = sp.coo_array(around[face[lost]] @ around.T)
     row, tried = lost[beside.row], beside.col
     middle = np.full(other.dim - 1, 1 / other.corners if other.corners == 3 else 0.5)
@@ -288,11 +294,13 @@ def _alone(
 def _on_face(
     surface: Faces, face: np.ndarray, x: np.ndarray, axes: np.ndarray, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where faces (m,) see points x (dim, m), moved onto them, and by how much: reference
-    coordinates (dim - 1, m), and (m,).
+    """Where faces (m,) see points x (dim, m), moved onto them: reference coordinates (dim - 1, m),
+    and how far from the points this is along the axes (m,), 0 where they are on the faces.
     """
     seen = surface.locate(face, x, axes, start)
     there = np.clip(seen, 0.0, 1.0)
     if surface.corners == 3:
         there /= np.maximum(there.sum(axis=0), 1.0)
-    return there, np.abs(there - seen).max(axis=0)
+    missed = x - surface.locations(face, there)[0]
+    off = np.linalg.norm(np.einsum("mad,dm->am", axes, missed), axis=0)
+    return there, np.where(np.abs(there - seen).max(axis=0) > NEWTON, off, 0.0)

@@ -33,6 +33,7 @@ class Integrals:
     nodes    (k,) nodes of the own side
     areas    (k,) integrals of the hat functions over the covered part, with the weight of the
              integrals
+    full     (k,) the same over all of the faces
     partial  (k,) whether a cell is covered in part only: there the contact lies where its weights
              put it, not at its node
     own      (k, nodes of the own body) and
@@ -45,6 +46,7 @@ class Integrals:
 
     nodes: np.ndarray
     areas: np.ndarray
+    full: np.ndarray
     partial: np.ndarray
     own: sp.csr_matrix
     other: sp.csr_matrix
@@ -60,7 +62,7 @@ def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> In
     functions over all of it. The overlap has at least one point of integration.
     """
     dual = _Dual(own, points)
-    nodes, rows, areas, partial = _contacts_of(dual, full)
+    nodes, rows, areas, full, partial = _contacts_of(dual, full)
     k, sides = len(nodes), (own, other)
     # Sum int psi_i N_j over blocks of points, so that memory stays bounded: W of the own side, W'
     # of the other, and the mean vector x - x' between the true places on both surfaces.
@@ -94,7 +96,7 @@ def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> In
         for d in range(own.dim):
             apart[d] += np.bincount(row.ravel(), means[:, :, d].ravel(), k)
     mine, theirs = (tidy(sp.diags(1 / areas) @ part) for part in W)
-    return Integrals(nodes, areas, partial, mine, theirs, apart / areas, least, nearest)
+    return Integrals(nodes, areas, full, partial, mine, theirs, apart / areas, least, nearest)
 
 
 class _Dual:
@@ -139,25 +141,28 @@ class _Dual:
 
 def _contacts_of(
     dual: _Dual, full: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The nodes (k,) of the contacts at the vertices of cells, of which those hardly covered pass
-    their share on; the contact (cell, v) of every vertex; area and `partial` of every contact.
+    their share on; the contact (cell, v) of every vertex; covered and full area and `partial` of
+    every contact.
     """
-    nodes, rows = np.unique(dual.corners, return_inverse=True)
-    rows = _pass_on(rows.reshape(dual.area.shape), dual.area, full[nodes])
-    strong, rows = np.unique(rows, return_inverse=True)
-    nodes, rows = nodes[strong], rows.reshape(dual.area.shape)
+    nodes, own = np.unique(dual.corners, return_inverse=True)
+    own = own.reshape(dual.area.shape)
+    share = np.bincount(own.ravel(), dual.area.ravel(), len(nodes)) / full[nodes]
+    strong, rows = np.unique(_pass_on(own, share), return_inverse=True)
+    nodes, rows = nodes[strong], rows.reshape(own.shape)
     areas = np.bincount(rows.ravel(), dual.area.ravel(), len(nodes))
+    of_faces = dual.area / np.maximum(share[own], 1e-300)  # 0 / 0 is 0
+    full = np.bincount(rows.ravel(), of_faces.ravel(), len(nodes))
     partial = np.zeros(len(nodes), dtype=bool)
     partial[rows[dual.partial]] = True
-    return nodes, rows, areas, partial
+    return nodes, rows, areas, full, partial
 
 
-def _pass_on(rows: np.ndarray, area: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """Contacts (cell, v) at the vertices of cells; those hardly covered give way to the strongest,
-    for an edge's force over an area as small as you like would be no pressure.
+def _pass_on(rows: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Contacts (cell, v) at the vertices of cells; those of which a small share is covered give way
+    to the strongest, for an edge's force over an area as small as you like would be no pressure.
     """
-    share = np.bincount(rows.ravel(), area.ravel(), len(full)) / full
     weak = (share < WEAK)[rows]
     best = np.argmax(share[rows], axis=1)
     weak &= ~np.all(weak, axis=1)[:, None]  # on a cell that is larger than the other surface

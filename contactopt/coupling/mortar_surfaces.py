@@ -54,8 +54,12 @@ def couple_surfaces(
         m, loose = _carried(sides, meshes, SIDES[m.own])
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
-    # as well where a plane of symmetry of both cuts it.
-    own_held = mine.held[:, m.nodes]
+    # as well where a plane of symmetry of both cuts it. A contact that moved to where the other
+    # surface ends is no more at its node, which a support may hold.
+    moved = np.linalg.norm(m.points - carrier.points[:, m.nodes], axis=0)
+    own_held = mine.held[:, m.nodes] & (moved <= NEAR * np.ptp(m.points, axis=1).max())
+    if carrier.mirror is not None:
+        own_held |= mine.held[:, m.nodes] & carrier.mirror[:, m.nodes]
     other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
     if carrier.mirror is not None:
         other_held |= carrier.mirror[:, m.nodes]
@@ -87,7 +91,7 @@ def couple_surfaces(
             f" {loose:.2g} contacts for each of its nodes, so that it can bulge between them; take"
             f" carrier = '{other}', or a finer mesh of the {side} body."
         )
-        return replace(made, remarks=(said,))
+        return replace(made, doubt=said)
     if crowded := _crowded(m, meshes):
         said = (
             f"contact '{pair.name}': supports hold the {side} body '{carrier.name}' at contacts of"
@@ -95,7 +99,7 @@ def couple_surfaces(
             f" may alternate; take carrier = '{SIDES[1 - m.own]}', or a finer mesh of the other"
             " body."
         )
-        return replace(made, remarks=(said,))
+        return replace(made, doubt=said)
     return made
 
 

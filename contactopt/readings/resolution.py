@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
@@ -15,12 +16,17 @@ from contactopt.readings.resultants import views
 # elements across the half-width of contact; with so few the largest pressure is some percent off
 # (reports/accuracy)
 FEWEST = 4
+# of the median traction, between neighbours on a tie that is joined more than once: one with a mesh
+# of one or two elements jumps by up to 0.6 where it is right (the smooth fields of a coarse mesh),
+# by 2 or more where forces alternate
+JUMP = 1.0
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
     """Sentences on couplings that do not pass a constant pressure on; for certified solutions also
-    on zones that end by themselves and are smaller than FEWEST elements.
+    on ties whose forces jump, and on zones that end by themselves and are smaller than FEWEST
+    elements.
     """
     coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:
@@ -30,7 +36,35 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
         " distributed: refine the meshes there, or ask for an accuracy."
         for (name, count), own in coarse(reduction, solution)
     ]
-    return (*coupled, *few)
+    return (*coupled, *_jumps(reduction, solution), *few)
+
+
+def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
+    """Sentences on ties that could give up no contact where others join their bodies too, and whose
+    forces jump there: between two contacts of a cell by more than JUMP of the median traction.
+    """
+    if all(made.tight is None for made in reduction.couplings):
+        return []
+    problem, found = reduction.problem, []
+    local = solution.reactions / problem.areas[:, None]
+    tractions = np.einsum("kij,ki->kj", reduction.frames, local)
+    usual = float(np.median(np.linalg.norm(tractions, axis=1)))
+    for pair, made in zip(problem.pairs, reduction.couplings):
+        if made.tight is None or not made.cells.size:
+            continue
+        own, cells = tractions[pair.contacts], made.cells
+        sizes = np.linalg.norm(own[cells] - own[np.roll(cells, 1, axis=0)], axis=2)
+        sizes[~made.tight[cells] & ~made.tight[np.roll(cells, 1, axis=0)]] = 0.0
+        worst = np.unravel_index(np.argmax(sizes), sizes.shape)
+        if sizes[worst] > JUMP * usual:
+            where = place_words(made.positions[:, cells[worst]])
+            found.append(
+                f"the tractions of the tie '{pair.name}' jump by {sizes[worst]:.3g} near ({where}),"
+                f" where others join its bodies too, and the median of all is {usual:.3g}: the tie"
+                " has too few contacts for both, so that its pressures are not reliable there;"
+                " refine the meshes along it."
+            )
+    return found
 
 
 def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
