@@ -21,5 +21,9 @@ class Unbalanced(InputError):
     path: PathResult | None = None
 
 
+class Damaged(ValueError):
+    """A file is not what its format says; the message says where."""
+
+
 class BackendError(RuntimeError):
     """A QP or conic backend failed; the message names it."""

@@ -328,7 +328,7 @@ def _summary(reduction: Reduction, solution: Solution, names: tuple[str, ...]) -
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    known = doubts(scene, reduction.couplings)
+    known = doubts(scene, reduction.couplings, reduction.planes)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
         "scene": scene.name,

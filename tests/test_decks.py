@@ -232,6 +232,7 @@ MEANT = {
         + "*surface, name=S\n b , s3\n*ELSET,ELSET=b\n1\n",
         1, {"S": 1}, 4,
     ),
+    "end of a file in DOS": (ONE + RIGHT + "\x1a", 1, {"S": 1}, 4),
     "tabs": (ONE.replace(",", "\t,\t").replace("\n", "\n\n") + RIGHT, 1, {"S": 1}, 4),
     "last place counts": (SQUARE + ONE.replace("1,0,0", "1,-1,0") + RIGHT, 1.5, {"S": 1}, 4),
     "lines of second order": (
@@ -359,6 +360,12 @@ REFUSED = {
     "elements from none": (ONE + "*ELGEN\n3,2\n", 9, "no element 3"),
     "part without end": ("*PART, NAME=P\n" + ONE, 1, "END PART"),
     "end without part": (ONE + "*END PART\n", 8, "PART"),
+    "two parts of one name": (f"*PART, NAME=P\n{ONE}*END PART\n*PART, NAME=p\n", 10, "two parts"),
+    "two instances of one name": (
+        f"*PART, NAME=P\n{ONE}*END PART\n*ASSEMBLY\n"
+        + 2 * "*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n", 13, "two instances",
+    ),
+    "no number of a node": (ONE.replace("3,1,1", ",1,1"), 4, "a number is missing"),
     "instance of none": ("*ASSEMBLY\n*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n", 2, "part P"),
     "axis of no length": (
         f"*PART, NAME=P\n{ONE}*END PART\n*ASSEMBLY\n*INSTANCE, NAME=I, PART=P\n0,0,0\n"

@@ -533,7 +533,7 @@ def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
     for old, new, words in (
         ("Low.All, Up.1", "Low.All, Up.None", "there is no set None of elements"),
         ("instance=Low", "instance=Lowest", "there is no instance Lowest"),
-        ("part=TOOL", "part=Toll", "is of part Toll, which is not there; parts: brick, tool"),
+        ("part=TOOL", "part=Toll", "is of part Toll, which is not above; parts: brick, tool"),
     ):
         path.write_text(text.replace(old, new))
         with pytest.raises(InputError, match=words):
@@ -934,6 +934,9 @@ def test_results_are_passed_over_and_free_formats_are_free(tmp_path, name, text,
     "name, text, words",
     [
         ("a.mesh", MEDIT.replace("Edges", "Polygons"), "line 9: Polygons are not read"),
+        ("a.msh", MSH2.replace("7 7 1 3 4", "7 7 1 3 9"), "a number or a word is not where"),
+        ("a.msh", MSH2.replace("3 1 1 0", "3 1 x 0"), "a number or a word is not where"),
+        ("a.mesh", MEDIT.replace("Dimension 2\n", ""), "must stand before Vertices"),
         ("a.mesh", MEDIT.replace("1 3 4 7", "1 3 4"), "Triangles are 2 rows of 4 numbers, not 7"),
         ("a.su2", SU2.replace("5 0 1 2 0", "22 0 1 2 4 5 6 0"), r"line 4: elements of type 22"),
         ("a.su2", SU2 + "NDIME= 2\n", r"line 22: it has several zones"),

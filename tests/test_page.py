@@ -186,7 +186,11 @@ def test_view_makes_the_page_of_an_earlier_run(tmp_path, capsys, monkeypatch):
     page = result.view(tmp_path / "other.html")
     assert data_of(page) == data_of(tmp_path / "view.html") and len(opened) == 2
     assert cli.main(["view", str(tmp_path / "nothing")]) == 2
-    assert "is not the folder of a finished run" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "is not the folder of a finished run (there is no summary.json in it); make" in said
+    (tmp_path / "summary.json").write_text("{\n  'a': 1}")
+    assert cli.main(["view", str(tmp_path)]) == 2
+    assert "(its summary.json is damaged in line 2)" in capsys.readouterr().err
 
 
 def damaged(data: bytes, way: str, rng: np.random.Generator) -> bytes:

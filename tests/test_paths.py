@@ -246,6 +246,27 @@ def test_a_state_that_nothing_can_hold_is_named():
         follow([pushed(x) for x in (0.0, 0.3, 0.5)])
 
 
+@pytest.mark.parametrize("kept", [True, False])
+def test_bodies_of_every_state_carry_its_own_loads(kept):
+    """A block that only the floor holds is pressed and pushed by tractions: its displacements at a
+    state are those of the path that ends there, whether the path kept them or finds them again.
+    """
+
+    def pushed(x):
+        block = replace(dragged(0.0).upper, supports=(), loads=(Traction("top", (x, -1.0)),))
+        return Scene("pushed", block, Rigid("floor"), 0.4)
+
+    states = [pushed(x) for x in (0.0, 0.1, 0.2)]
+    path = follow(states)
+    for step in (0, 1, 2, -1):
+        until = follow(states[: step % 3 + 1])
+        exact = until.reduction.displaced(until.states[-1].solution)[0]
+        if not kept:
+            path = replace(path, states=tuple(replace(own, bodies=()) for own in path.states))
+        found = path.at(step)[0].displaced(path.at(step)[1])[0]
+        np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+
+
 def test_files_of_a_path(cycle, tmp_path):
     import pandas as pd
 

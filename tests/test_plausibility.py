@@ -102,6 +102,46 @@ def test_a_plate_on_a_contact_surface_is_told():
     assert any("the plate on 'low' of body 'one'" in note for note in notes)
 
 
+@pytest.mark.parametrize("copies, told", [(1, False), (2, True), (3, True), (4, True)])
+def test_copies_without_planes_of_symmetry_are_told(copies, told):
+    """A half model has one plane, a quarter has two; a body that nothing halves has none."""
+    scene = replace(pressed(), copies=copies)
+    assert told == any(f"copies = {copies}, but 0 planes of symmetry" in n for n in said(scene))
+    mesh = scene.bodies[0].mesh.with_boundaries({"left": lambda p: np.isclose(p[0], 0)})
+    foundation = (
+        scene.bodies[1]
+        .mesh.translated((5.0, 0.0))
+        .with_boundaries(
+            {
+                "left": lambda p: np.isclose(p[0], 0),
+                "low": lambda p: np.isclose(p[1], -10),
+                "up": lambda p: np.isclose(p[1], 0),
+            }
+        )
+    )
+    half = replace(
+        scene,
+        bodies=(
+            replace(scene.bodies[0], mesh=mesh, supports=(Support("left", {"x": 0.0}),)),
+            replace(
+                scene.bodies[1],
+                mesh=foundation,
+                supports=(Support("low"), Support("left", {"x": 0.0})),
+            ),
+        ),
+    )
+    assert (copies > 2) == any("1 plane of symmetry is found" in note for note in said(half))
+
+
+def test_units_in_the_other_order_are_refused():
+    for units in (("MPa", "mm"), ("psi", "length"), ("a", "m")):
+        with pytest.raises(InputError, match="in the other order"):
+            pressed(units=units)
+    with pytest.raises(InputError, match="did you mean 'mm'"):
+        pressed(units=("MM", "MPa"))
+    assert pressed(units=("furlong", "stone")).units == ("furlong", "stone")
+
+
 @pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3])
 def test_a_right_scene_gets_no_sentence_in_any_units(scale):
     """Lengths in mm, m or micrometres, stresses to them."""
@@ -118,7 +158,8 @@ def test_named_scenes_get_no_sentence(name):
 
     scene = make_scene(name)
     if sum(part.meshed for part in scene.parts) and scene.dim == 2:
-        assert doubts(scene, posed(scene).couplings) == []
+        made = posed(scene)
+        assert doubts(scene, made.couplings, made.planes) == []
 
 
 def test_an_impossible_strain_is_refused_and_not_noted():

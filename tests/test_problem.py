@@ -1,3 +1,6 @@
+import json
+import pickle
+
 import numpy as np
 import pytest
 from conftest import one_contact
@@ -5,6 +8,7 @@ from conftest import one_contact
 from contactopt import (
     InputError,
     InterfaceProblem,
+    Status,
     natural_map_residual,
     reduce,
     scenes,
@@ -25,6 +29,13 @@ def test_the_three_solutions_of_one_contact_have_residual_zero(reaction):
 @pytest.mark.parametrize("reaction", [(1.0, 0.7), (0.4, -0.4), (0.5, 0.5), (1.0, 1.1), (-0.1, 0.0)])
 def test_what_does_not_solve_has_a_large_residual(reaction):
     assert natural_map_residual(one_contact((0.8, 1.0), mu=1.0), [reaction]) > 1e-2
+
+
+@pytest.mark.parametrize("status", Status)
+def test_a_status_is_equal_to_its_word(status):
+    assert status == status.label == str(status) == f"{status}" == json.loads(json.dumps(status))
+    assert Status(status.label) is status is pickle.loads(pickle.dumps(status))
+    assert " " in status.sentence
 
 
 def test_rho_one_is_the_published_formula():

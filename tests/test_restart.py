@@ -57,7 +57,12 @@ def test_a_time_limit_stops_a_run_and_resume_ends_it(tmp_path, capsys, monkeypat
     assert main([*line, "--time-limit", "0"]) == 1
     assert "the time ran out" in capsys.readouterr().out
     assert main([*line, "--resume"]) == 0
-    assert main([*line, "--resume"]) == 2 and "is complete" in capsys.readouterr().err
+    assert main([*line, "--resume"]) == 2
+    assert "is complete" in (said := capsys.readouterr().err) and "--start out/cattaneo-2d" in said
+    for content in (b"PK", b"", b"no archive"):
+        (tmp_path / FILE).write_bytes(content)
+        assert main([*line, "--start", "."]) == 2
+        assert "is damaged; run the scene anew" in capsys.readouterr().err
     assert main([*line, "--resume", "--start", "out/cattaneo-2d"]) == 2
     assert "exclude each other" in capsys.readouterr().err
 

@@ -71,7 +71,7 @@ def test_no_list_of_planes_is_empty(name):
 def test_images_without_a_plane_are_said_so(monkeypatch):
     monkeypatch.setattr(scene_check, "posed", lambda scene: posed(scene)._replace(planes=()))
     text = scene_check.check_scene([make_scene("punch-2d", elements=4)]).text
-    assert "2 images make the whole; no support holds a plane of symmetry" in text
+    assert "copies = 2, but 0 planes of symmetry are found" in text
 
 
 KINDS = {name.partition(":")[0].partition("@")[0] for name in (*ROWS, *PLACED)}

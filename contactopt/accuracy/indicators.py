@@ -194,10 +194,8 @@ def along_path(
 def _state(solved: Solved, number: int) -> Solved:
     """One state of a load path as a scene of its own, after the slip of the states before it."""
     assert solved.path is not None
-    state = solved.path.states[number]
-    reduction = solved.reduction.loaded(state.scene)
-    reduction = replace(reduction, problem=solved.path.problem(number))
-    return replace(solved, reduction=reduction, solution=state.solution, path=None)
+    reduction, solution = solved.path.at(number)
+    return replace(solved, reduction=reduction, solution=solution, path=None)
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:

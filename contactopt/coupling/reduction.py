@@ -155,6 +155,10 @@ class Reduction:
         self._known[solution] = each(displaced, parts, _parallel(self.bodies))
         return self._known[solution]
 
+    def keep(self, solution: Solution, displaced: tuple[np.ndarray, ...]) -> None:
+        """Take these displacements of the bodies for those of a solution."""
+        self._known[solution] = displaced
+
     def seen(self, displaced: Sequence[Any]) -> np.ndarray:
         """Displacements u (k, dim) of the contacts with the gap, from those of the bodies."""
         q = self.problem.q

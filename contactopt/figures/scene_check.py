@@ -87,7 +87,12 @@ def check_scene(
     costs, memory = _costs(scene, made, options, once)
     coupled = [text for own in made.couplings for text in own.remarks]
     told = list(dict.fromkeys([*told, *said_of_meshes(scene), *heard]))
-    notes = [*told, *_balance(states, made, free), *doubts(scene, made.couplings), *coupled]
+    notes = [
+        *told,
+        *_balance(states, made, free),
+        *doubts(scene, made.couplings, made.planes),
+        *coupled,
+    ]
     length, stress = scene.units
     lines = [f"{scene.name}: {scene.kind}, lengths in {length}, stresses in {stress}"]
     for part, body in zip(scene.parts, made.bodies):
@@ -105,8 +110,7 @@ def check_scene(
     if scene.copies > 1:
         where = " and ".join(_direction(plane.inward) for plane in made.planes)
         where = where and f", across planes with normals {where}"
-        none = "; no support holds a plane of symmetry, so that none is known"
-        lines.append(f"{scene.copies} images make the whole{where or none}")
+        lines.append(f"{scene.copies} images make the whole{where}")
     if len(states) > 1:
         lines.append(f"load path of {len(states)} states; the last one is described")
     lines += _cost_lines(costs, memory, len(states))

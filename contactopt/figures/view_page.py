@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 
 from contactopt.cards import columns
-from contactopt.checks import short
 from contactopt.errors import InputError
 from contactopt.figures.html import filled, remark_list, write_html
 from contactopt.figures.page_data import page_data
@@ -55,12 +54,22 @@ def write_page(folder: str | Path, file: str | Path) -> Path:
             json.dumps(data, allow_nan=False)
     # a damaged file breaks its reader in any way; that of meshio exits
     except (Exception, SystemExit) as error:
-        how = short(" ".join(str(error).split()) or type(error).__name__, 200).strip("'\"")
         raise InputError(
-            f"'{folder}' is not the folder of a finished run ({how}); make one with: contactopt run"
-            f" SCENE --out {folder}"
+            f"'{folder}' is not the folder of a finished run ({_why(error)}); make one with:"
+            f" contactopt run SCENE --out {folder}"
         ) from error
     return write_html(file, title, body, data, ["painter.js", "view.js"])
+
+
+def _why(error: BaseException) -> str:
+    """What is wrong with the files of a run, without the words of Python."""
+    if isinstance(error, FileNotFoundError):
+        return f"there is no {Path(error.filename).name} in it"
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, json.JSONDecodeError):
+        return f"its summary.json is damaged in line {error.lineno}"
+    return str(error) if isinstance(error, InputError) else "one of its files is damaged"
 
 
 def certificate_words(summary: dict[str, Any]) -> str:

@@ -19,7 +19,7 @@ from contactopt.errors import InputError
 
 LARGEST = 10**300
 # what tomllib says of an entry or a table that is there twice
-TWICE = re.compile(r"Cannot (?:overwrite|declare|mutate|expand|redefine)")
+TWICE = re.compile(r"Cannot (?:overwrite|declare|mutate|expand|redefine)|Duplicate")
 MOST_BYTES = 1_000_000  # bytes of a file that people write
 TOKEN = re.compile(
     r"""(?P<space>[ \t\r\n]+|\#[^\n]*)
@@ -192,10 +192,23 @@ def read_table(path: Path, what: str = "scene file") -> Table:
         line = int(found[1]) if found else text.count("\n") + 1
         said = re.sub(r" \(at .*\)", "", str(error))
         if TWICE.match(said):
-            said = f"this name is there twice ({said[:1].lower()}{said[1:]})"
+            said = f"{_again(said, text, line)} is there twice; keep one of them"
         raise InputError(f"{path.name}, line {line}: {said[:1].lower()}{said[1:]}.") from error
     except (RecursionError, OSError) as error:
-        raise InputError(f"{what} '{path}' cannot be read: {type(error).__name__}.") from error
+        why = str(getattr(error, "strerror", "its tables and lists are nested too deeply"))
+        raise InputError(f"{what} '{path}' cannot be read: {why}.") from error
+
+
+def _again(said: str, text: str, line: int) -> str:
+    """The entry or table that is there a second time, by what tomllib says of it, or by the text
+    of its line.
+    """
+    name = ".".join(re.findall(r"'([^']*)'", said))
+    if said.startswith("Duplicate"):
+        return repr(name)
+    words = (text + "\n").split("\n")[line - 1].split("=")[0].strip()
+    name = f"[{name}]" if name else words
+    return name if name.startswith("[") else repr(name)
 
 
 def parse(text: str) -> dict[str, Any]:

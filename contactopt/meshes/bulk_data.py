@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.errors import InputError
+from contactopt.errors import Damaged, InputError
 
 # card -> shape by its number of nodes
 _SHAPES = (
@@ -53,7 +53,7 @@ log = logging.getLogger(__name__)
 
 def read_bulk_data(path: Path) -> Any:
     """The mesh of a file, with the properties as groups of elements. InputError with the line of
-    what is not read, ValueError for what is no such file.
+    what is not read, Damaged for what is no such file.
     """
     import meshio
 
@@ -64,7 +64,7 @@ def read_bulk_data(path: Path) -> Any:
         log.warning("%s: elements without extent are left out: %s", path, ", ".join(reader.passed))
     tags = np.array(sorted(reader.nodes), dtype=np.int64)
     if not len(tags) or not reader.elements:
-        raise ValueError("it holds no nodes or no elements")
+        raise Damaged("it holds no nodes or no elements")
     reader.tell_sections()
     points = np.array([reader.nodes[tag] for tag in tags.tolist()])
     cells, groups = [], []
@@ -162,7 +162,7 @@ def _cards(path: Path) -> Iterator[Card]:
     """Line and fields of each card of the bulk data, with the lines in which it goes on."""
     data = path.read_bytes()
     if b"\0" in data:
-        raise ValueError("it is no text")
+        raise Damaged("it is no text")
     lines = data.decode("latin-1").splitlines()
     begin = [n for n, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
     if len(begin) > 1:
@@ -176,7 +176,7 @@ def _cards(path: Path) -> Iterator[Card]:
         fields = _fields(line)
         if line[0] in "+*" or not fields[0]:
             if card is None:
-                raise ValueError("it begins within a card")
+                raise Damaged("it begins within a card")
             card[1].extend(fields[1:])
             continue
         if card is not None:

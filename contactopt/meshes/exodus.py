@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.errors import Damaged
 from contactopt.meshes.inp_elements import FACES, FACET
 
 # type without its number of nodes -> that number -> type in meshio
@@ -37,7 +38,7 @@ HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22
 def read_exodus(path: Path) -> Any:
     """The mesh of a file, with blocks and side sets as sets of elements.
 
-    ValueError, KeyError, IndexError or OSError where the file does not keep to the format.
+    Damaged, KeyError, IndexError or OSError where the file does not keep to the format.
     """
     if path.read_bytes()[:3] == b"CDF":
         from scipy.io import netcdf_file
@@ -47,7 +48,7 @@ def read_exodus(path: Path) -> Any:
     try:
         import h5py
     except ImportError as error:
-        raise ValueError("it is of HDF5; pip install h5py") from error
+        raise Damaged("it is of HDF5; pip install h5py") from error
     with h5py.File(path) as file:
         return _mesh(file, lambda variable: variable.attrs["elem_type"])
 
@@ -71,7 +72,7 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
         end += len(nodes)
         kind = kinds.get(nodes.shape[1], "")
         if not kind:
-            raise ValueError(f"the elements of block {name!r} are of a type that is not known")
+            raise Damaged(f"the elements of block {name!r} are of a type that is not known")
         if kind.startswith("hexahedron"):
             nodes = nodes[:, HEXAHEDRON[: nodes.shape[1]]]
         cells.append((kind, nodes))
@@ -91,7 +92,7 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
                 cells.append((FACET[facets.shape[1]], facets))
                 known += len(facets)
         if known < len(elements):
-            raise ValueError(f"side set {name!r} names an element or a side that is not known")
+            raise Damaged(f"side set {name!r} names an element or a side that is not known")
     of_cells = {
         name: [own.get(i, np.zeros(0, dtype=int)) for i in range(len(cells))]
         for name, own in sets.items()

@@ -46,9 +46,13 @@ def read_inp(path: Path) -> Any:
     for block in blocks(path):
         verb, what = ("end", block.keyword[3:]) if block.keyword[:3] == "end" else ("", "")
         if block.keyword == "part":
+            if bare(block.need("name")) in parts:
+                raise block.fail(f"there are two parts {block.need('name')}")
             now = parts[bare(block.need("name"))] = Scope()
         elif block.keyword == "instance":
             now = _instance(parts, block)
+            if bare(now.name) in whole.instances:
+                raise block.fail(f"there are two instances {now.name}")
         elif what == "instance" and "instance" in opened:
             whole.add(now)
             now = whole
@@ -96,7 +100,7 @@ def _instance(parts: dict[str, Scope], block: Block) -> Scope:
     name, of = block.need("name"), block.need("part")
     if bare(of) not in parts:
         known = ", ".join(parts) or "none"
-        raise block.fail(f"instance {name} is of part {of}, which is not there; parts: {known}")
+        raise block.fail(f"instance {name} is of part {of}, which is not above; parts: {known}")
     made = parts[bare(of)].copy()
     made.name, made.move = name, inp_generation.motion(block, block.rows)
     return made

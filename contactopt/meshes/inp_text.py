@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from contactopt.errors import InputError
+from contactopt.errors import Damaged, InputError
 
 log = logging.getLogger("contactopt.meshes.inp")
 # keywords that are read -> their options, without blanks
@@ -112,7 +112,8 @@ class Block:
             return int(word)
         if re.fullmatch(r"[+-]?\d{1,10}", word, re.ASCII) and abs(int(word)) < LARGEST:
             return int(word)
-        raise self.fail(f"{word[:40]!r} is no whole number below {LARGEST}", place)
+        wrong = f"{word[:40]!r} is no whole number below {LARGEST}"
+        raise self.fail(wrong if word else "a number is missing", place)
 
     def real(self, place: int, word: str) -> float:
         """A number; an exponent may be written with D, and an empty word is zero."""
@@ -133,7 +134,7 @@ _EXPONENT = str.maketrans({"d": "e", "D": "e", "_": "?"})
 def blocks(path: Path) -> Iterator[Block]:
     """The blocks of a file that are read, included files in the place of the lines that name them.
 
-    ValueError for what is no such file; InputError with its line for what is not known.
+    Damaged for what is no such file; InputError with its line for what is not known.
     """
     source = Source([], [])
     lines = source.open(path, 0)
@@ -143,7 +144,7 @@ def blocks(path: Path) -> Iterator[Block]:
         place, text = lines.pop()
         if not text.startswith("*"):
             if block is None:
-                raise ValueError("it does not begin with a keyword")
+                raise Damaged("it does not begin with a keyword")
             block.rows.append((place, _words(text)))
             continue
         while text.endswith(",") and lines and _goes_on(text, lines[-1][1]):
@@ -160,7 +161,7 @@ def blocks(path: Path) -> Iterator[Block]:
             stepping = block.keyword == "step" or (stepping and block.keyword != "endstep")
         block = found
     if block is None:
-        raise ValueError("it holds no keyword")
+        raise Damaged("it holds no keyword")
     yield from _known(block, stepping)
 
 
@@ -220,11 +221,12 @@ def _lines(path: Path) -> list[tuple[int, str]]:
     """Number and text of the lines that are neither empty nor comments, the last one first."""
     data = path.read_bytes()
     if b"\0" in data:
-        raise ValueError("it is no text")
+        raise Damaged("it is no text")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.decode("latin-1")
+    text = text.rstrip("\x1a")  # the end of a file in DOS
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     found = ((number, line.strip()) for number, line in enumerate(lines, 1))
     return [(n, line) for n, line in found if line and not line.startswith("**")][::-1]

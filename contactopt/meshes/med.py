@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from skfem import Mesh
 
+from contactopt.errors import Damaged
 from contactopt.meshes.cells import mirrored
 from contactopt.meshes.mesh_repair import in_order
 
@@ -25,13 +26,13 @@ if TYPE_CHECKING:
 
 
 def read_med(path: Path) -> Any:
-    """The mesh of a file with its groups as sets. ValueError, KeyError or OSError where the file
+    """The mesh of a file with its groups as sets. Damaged, KeyError or OSError where the file
     does not keep to the format.
     """
     try:
         import h5py
     except ImportError as error:
-        raise ValueError("it is of HDF5; pip install h5py") from error
+        raise Damaged("it is of HDF5; pip install h5py") from error
     with h5py.File(path) as file:
         (name,) = _one(file["ENS_MAA"], "meshes")
         mesh = file["ENS_MAA"][name]
@@ -43,7 +44,7 @@ def read_med(path: Path) -> Any:
 
 def _one(group: Collection[str], what: str) -> list[str]:
     if len(group) != 1:
-        raise ValueError(f"it holds {len(group)} {what}, not one")
+        raise Damaged(f"it holds {len(group)} {what}, not one")
     return list(group)
 
 
@@ -56,7 +57,7 @@ def _mesh(mesh: Mesh, dim: int, families: h5py.Group) -> meshio.Mesh:
     cells, tags = [], []
     for med, own in mesh["MAI"].items():
         if med not in kinds:
-            raise ValueError(f"elements of type {med} are not known")
+            raise Damaged(f"elements of type {med} are not known")
         nodes = own["NOD"][()].reshape(-1, int(own["NOD"].attrs["NBR"])) - 1
         kind = kinds[med]
         nodes = mirrored(kind, nodes) if kind.startswith(("tetra", "hexahedron")) else nodes

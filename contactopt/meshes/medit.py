@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.errors import InputError
+from contactopt.errors import Damaged, InputError
 
 KINDS = {
     "edges": ("line", 2), "triangles": ("triangle", 3), "quadrilaterals": ("quad", 4),
@@ -32,14 +32,14 @@ WORD = re.compile(r"(?<![\w.])[A-Za-z]{2,}\w*")  # not the exponent of a number
 
 def read_medit(path: Path) -> Any:
     """The mesh of a file, with the references of its elements. InputError with the line of what is
-    not read, ValueError for what is no such file.
+    not read, Damaged for what is no such file.
     """
     import meshio
 
     text = re.sub(r'#.*|"[^"\n]*"', "", path.read_text("latin-1"))
     words = [*WORD.finditer(text)]
     if not words or words[0][0].lower() != "meshversionformatted":
-        raise ValueError("it does not begin with MeshVersionFormatted")
+        raise Damaged("it does not begin with MeshVersionFormatted")
     dim, points = 0, np.zeros((0, 0))
     cells: list[tuple[str, np.ndarray]] = []
     references: list[np.ndarray] = []
@@ -48,6 +48,8 @@ def read_medit(path: Path) -> Any:
         if name == "dimension":
             dim = int(_table(word[0], ["1", *body], 1)[0, 0])
         elif name == "vertices":
+            if dim not in (2, 3):
+                raise Damaged("Dimension 2 or 3 must stand before Vertices")
             points = _table(word[0], body, dim + 1)[:, :-1]
         elif name in KINDS:
             kind, width = KINDS[name]
@@ -58,8 +60,8 @@ def read_medit(path: Path) -> Any:
             line = text.count("\n", 0, word.start()) + 1
             said = f"mesh file '{path}', line {line}: {word[0]} are not read from this format"
             raise InputError(f"{said}; save it as .msh or .inp.")
-    if dim not in (2, 3) or not len(points):
-        raise ValueError("it has no vertices in two or three dimensions")
+    if not len(points):
+        raise Damaged("it has no vertices")
     return meshio.Mesh(points, cells, cell_data={"medit:ref": references})
 
 
@@ -68,7 +70,5 @@ def _table(name: str, body: list[str], width: int) -> np.ndarray:
     numbers = np.array(body, dtype=float)
     count = int(numbers[0]) if len(numbers) else 0
     if len(numbers) != 1 + count * width:
-        raise ValueError(
-            f"{name} are {count} rows of {width} numbers, not {len(numbers) - 1} in all"
-        )
+        raise Damaged(f"{name} are {count} rows of {width} numbers, not {len(numbers) - 1} in all")
     return numbers[1:].reshape(count, width)

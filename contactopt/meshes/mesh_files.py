@@ -104,7 +104,8 @@ def _body(path: Path, groups: FileGroups, group: str | None, scale: float) -> sk
     bodies = groups.names(dim)
     hint = "mesh it in one piece"
     if len(bodies) > 1:
-        hint = f"choose the body by its group, one of {', '.join(bodies)}"
+        others = ", ".join(name for name in bodies if name != group)
+        hint = f"choose the body by its group, one of {others}"
     merged = np.arange(cells.points.shape[1])
     if group is not None or len(bodies) < 2:  # nodes of different bodies stay apart
         merged = representatives(cells)
@@ -300,7 +301,9 @@ def _tell_others(path: Path, groups: FileGroups) -> None:
     if not others:
         return
     size = np.ptp(groups.points, axis=0).max() or 1.0
-    places = np.unique(np.round(groups.points / (SAME * size)), axis=0, return_inverse=True)[1]
+    with np.errstate(invalid="ignore"):  # nodes of no element may have no place
+        steps = np.round(groups.points / (SAME * size))
+    places = np.unique(steps, axis=0, return_inverse=True)[1]
     numbers = np.random.default_rng(0).integers(0, 2**63, len(groups.points), dtype=np.uint64)
     key = numbers[places.ravel()]
     sides = [np.zeros(0, dtype=np.uint64)]

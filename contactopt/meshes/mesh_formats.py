@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.errors import InputError
+from contactopt.errors import Damaged, InputError
 from contactopt.meshes.bulk_data import read_bulk_data
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
@@ -157,14 +157,26 @@ def _read(path: Path) -> Any:
         except InputError:  # it names what it does not read
             raise
         except (Exception, SystemExit) as error:
-            text = printed.getvalue() if isinstance(error, SystemExit) else str(error)
-            text = f"{error} in it is not known" if isinstance(error, KeyError) else text
-            said = said or " ".join(text.split())[:200] or type(error).__name__
+            said = said or _words(error, printed.getvalue())
     advice = "; save Gmsh files as text in version 4.1 or 2.2" if "gmsh" in formats else ""
     raise InputError(
         f"mesh file '{path}' cannot be read as {' or '.join(formats)} ({said}); it is damaged or of"
         f" another format{advice}."
     )
+
+
+def _words(error: BaseException, printed: str) -> str:
+    """What a reader found, without the words of Python."""
+    import meshio
+
+    text = ""
+    if isinstance(error, Damaged | meshio.ReadError):
+        text = str(error)
+    elif isinstance(error, SystemExit):
+        text = printed
+    elif isinstance(error, KeyError):
+        text = f"{error} in it is not known"
+    return " ".join(text.split())[:200] or "a number or a word is not where it belongs"
 
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[], Any]]:
@@ -208,8 +220,7 @@ def _read_apart(path: Path, name: str, size: int) -> Any:
     try:
         done = subprocess.run(command, capture_output=True, timeout=patience, check=False)
     except subprocess.TimeoutExpired as error:
-        raise ValueError(f"no end after {patience:.0f} s") from error
+        raise Damaged(f"no end after {patience:.0f} s") from error
     if done.returncode:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        raise ValueError(said[-1] if said else f"the reader ended with code {done.returncode}")
+        raise Damaged(done.stderr.decode(errors="replace").rpartition("ReadError: ")[2])
     return pickle.loads(done.stdout)

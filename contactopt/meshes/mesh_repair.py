@@ -12,7 +12,7 @@ import skfem
 from scipy.spatial import KDTree
 
 from contactopt.checks import place_words
-from contactopt.errors import InputError
+from contactopt.errors import Damaged, InputError
 from contactopt.meshes.cells import (
     area_vectors,
     joined,
@@ -109,14 +109,14 @@ def middles(kind: str, places: np.ndarray) -> list[np.ndarray]:
 
 def in_order(points: np.ndarray, nodes: np.ndarray) -> np.ndarray:
     """The nodes (e, 27) of hexahedra whose last seven come in an order that formats do not agree
-    about, in that of meshio: each lies nearest to the middle that it is. ValueError if one is not.
+    about, in that of meshio: each lies nearest to the middle that it is. Damaged if one is not.
     """
     places = points[nodes].transpose(2, 1, 0)
     wanted = np.stack(middles("hexahedron20", places), axis=1)
     apart = np.linalg.norm(wanted[:, :, None] - places[:, None, 20:], axis=0)  # (7, 7, e)
     nearest = np.argmin(apart, axis=1).T
     if np.any(np.sort(nearest, axis=1) != np.arange(7)):
-        raise ValueError("the nodes in the faces of a hexahedron of 27 nodes lie at wrong places")
+        raise Damaged("the nodes in the faces of a hexahedron of 27 nodes lie at wrong places")
     return np.concatenate([nodes[:, :20], np.take_along_axis(nodes[:, 20:], nearest, 1)], axis=1)
 
 

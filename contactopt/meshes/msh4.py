@@ -21,6 +21,8 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.errors import Damaged
+
 # sections of results: $NodeData ... $EndNodeData
 VIEWS = re.compile(
     rb"^\$(NodeData|ElementData|ElementNodeData|InterpolationScheme)\b.*?^\$End\1\s*",
@@ -64,7 +66,7 @@ def without_views(path: Path) -> Iterator[Path]:
 
 
 def read_msh4(path: Path) -> Any:
-    """The mesh of a file with the physical groups as sets of elements by name. ValueError or
+    """The mesh of a file with the physical groups as sets of elements by name. Damaged or
     KeyError where the file ends early or breaks the format.
     """
     sections = _sections(path)
@@ -93,7 +95,7 @@ def read_parametric(path: Path) -> Any:
     Mesh.SaveParametric writes them in text; meshio reads the others. Errors as above.
     """
     if version(path)[1]:
-        raise ValueError("it has parametric nodes in binary; save it without Mesh.SaveParametric")
+        raise Damaged("it has parametric nodes in binary; save it without Mesh.SaveParametric")
     sections = _sections(path)
     names, reader = _names(sections), sections["ParametricNodes"]
     tags, points = [], []
@@ -145,7 +147,7 @@ def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any
     for kind, rows in blocks:
         place = np.searchsorted(tags, rows, sorter=order)
         if rows.size and (place.max() == len(tags) or (tags[order[place]] != rows).any()):
-            raise ValueError("an element names a node that is not there")
+            raise Damaged("an element names a node that is not there")
         name = _gmsh_to_meshio_type[kind]
         cells.append((name, _gmsh_to_meshio_order(name, order[place])))
     return meshio.Mesh(points, cells, cell_sets=sets)
@@ -161,7 +163,7 @@ class _Numbers:
         """As many numbers of a kind, integers of 64 or 'f8' of 64 bits."""
         first, self.place = self.place, self.place + count
         if count < 0 or self.place > len(self.words):
-            raise ValueError("a section ends early")
+            raise Damaged("a section ends early")
         values = np.array(self.words[first : self.place], dtype=float)
         return values if kind == "f8" else values.astype(np.int64)
 
@@ -183,7 +185,7 @@ class _Bytes(_Numbers):
         dtype = np.dtype(self.order + kind)
         first, self.place = self.place, self.place + count * dtype.itemsize
         if count < 0 or self.place > len(self.data):
-            raise ValueError("a section ends early")
+            raise Damaged("a section ends early")
         values = np.frombuffer(self.data, dtype, count, first)
         return values.astype(float if kind == "f8" else np.int64)
 
@@ -195,9 +197,9 @@ def _sections(path: Path) -> dict[str, _Numbers]:
     one = data[data.index(b"\n", data.index(b"$MeshFormat") + 12) + 1 :][:4]
     order = ">" if one == b"\0\0\0\1" else "<"
     if binary and data.split(maxsplit=4)[3] != b"8":
-        raise ValueError("its numbers are not of eight bytes")
+        raise Damaged("its numbers are not of eight bytes")
     if b"$PartitionedEntities" in data:
-        raise ValueError("it is a partitioned mesh; save it in one piece")
+        raise Damaged("it is a partitioned mesh; save it in one piece")
     for name in ("PhysicalNames", "Entities", "ParametricNodes", "Nodes", "Elements"):
         start = data.find(f"${name}".encode())
         if start >= 0:
@@ -207,7 +209,7 @@ def _sections(path: Path) -> dict[str, _Numbers]:
             in_text = name == "PhysicalNames" or not binary
             found[name] = _Numbers(part) if in_text else _Bytes(part, order)
         elif name == "Elements" or (name == "Nodes" and "ParametricNodes" not in found):
-            raise ValueError(f"it has no section ${name}")
+            raise Damaged(f"it has no section ${name}")
     return found
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.errors import InputError
+from contactopt.errors import Damaged, InputError
 
 KINDS = {3: ("line", 2), 5: ("triangle", 3), 9: ("quad", 4), 10: ("tetra", 4)}
 KINDS |= {12: ("hexahedron", 8), 13: ("wedge", 6), 14: ("pyramid", 5)}
@@ -19,7 +19,7 @@ KINDS |= {12: ("hexahedron", 8), 13: ("wedge", 6), 14: ("pyramid", 5)}
 
 def read_su2(path: Path) -> Any:
     """The mesh of a file, with its markers as sets of elements. InputError with the line of what is
-    not read, ValueError for what is no such file.
+    not read, Damaged for what is no such file.
     """
     import meshio
 
@@ -32,7 +32,7 @@ def read_su2(path: Path) -> Any:
         number, line = lines.pop()
         key, sign, value = (word.strip() for word in line.partition("="))
         if not sign:
-            raise ValueError(f"line {number} has no '='")
+            raise Damaged(f"line {number} has no '='")
         if key == "MARKER_TAG":
             name = value
         elif key in ("NDIME", "NZONE", "NELEM", "MARKER_ELEMS", "NPOIN"):
@@ -44,7 +44,7 @@ def read_su2(path: Path) -> Any:
                 continue
             block = [lines.pop() for _ in range(min(count, len(lines)))]
             if len(block) < count:
-                raise ValueError(f"it ends before the {count} rows of {key}")
+                raise Damaged(f"it ends before the {count} rows of {key}")
             if key == "NPOIN":
                 points = np.array([row.split()[:dim] for _, row in block], dtype=float)
                 continue

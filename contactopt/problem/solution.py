@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import StrEnum
 
 import numpy as np
 
@@ -12,8 +12,11 @@ from contactopt.linear.stacked import Stacked
 from contactopt.problem.feasibility import Infeasible
 
 
-class Status(Enum):
-    """How a solve ended: a word for tables and a sentence for people."""
+class Status(StrEnum):
+    """How a solve ended: a word for tables, which it is equal to, and a sentence for people."""
+
+    label: str
+    sentence: str
 
     SOLVED = "solved", "the natural-map residual is at most the tolerance"
     SETTLED = (
@@ -31,12 +34,11 @@ class Status(Enum):
     INFEASIBLE = "infeasible", "the problem has no solution, which is proved"
     BACKEND_FAILED = "backend_failed", "a QP or conic backend failed"
 
-    def __init__(self, label: str, sentence: str):
-        self.label = label
-        self.sentence = sentence
-
-    def __str__(self) -> str:
-        return self.label
+    def __new__(cls, label: str, sentence: str) -> Status:
+        made = str.__new__(cls, label)
+        made._value_ = made.label = label
+        made.sentence = sentence
+        return made
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
+from contactopt.coupling.planes_of_symmetry import SymmetryPlane
 from contactopt.scenes.material_library import STRESSES
 from contactopt.scenes.scene import Part, Scene
 
@@ -23,13 +25,18 @@ STIFFER = 3e5  # ratio of Young's moduli: that of steel to soft rubber is 1e5
 LARGER = 300.0  # ratio of sizes: metres beside millimetres, of bodies up to three times as large
 
 
-def doubts(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
-    """One sentence for everything about a scene that is probably not as it is meant."""
+def doubts(
+    scene: Scene, couplings: Sequence[Coupling], planes: Sequence[SymmetryPlane]
+) -> list[str]:
+    """One sentence for everything about a scene that is probably not as it is meant; `planes` are
+    those of symmetry.
+    """
     meshed = [part for part in scene.meshed.values() if part.given]
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]
     found += [note for part in meshed for note in _faint_loads(scene, part)]
     found += [note for part in meshed for note in _pointed(part)]
     found += _unloaded(scene, couplings)
+    found += _missing_planes(scene, planes)
     return [*found, *_stiffness(scene), *_sizes(meshed), *_gaps(scene, couplings)]
 
 
@@ -46,6 +53,19 @@ def _unloaded(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
     return [
         "nothing pushes the bodies: there is no load, no displacement of a support and no overlap;"
         " is a load missing?"
+    ]
+
+
+def _missing_planes(scene: Scene, planes: Sequence[SymmetryPlane]) -> list[str]:
+    """Images of a body without the planes that they are images in."""
+    known = len(scene.meshed) + len(scene.rigid) == len(scene.parts)
+    if not known or 2 ** len(planes) >= scene.copies:
+        return []
+    return [
+        f"copies = {scene.copies}, but {count(len(planes), 'plane')} of symmetry"
+        f" {'is' if len(planes) == 1 else 'are'} found, which makes {2 ** len(planes)}: all forces"
+        f" are those of {scene.copies} bodies together; drop copies, or hold the bodies in each"
+        " plane of symmetry along its normal alone."
     ]
 
 

@@ -325,6 +325,12 @@ def check_units(units: object) -> None:
         raise InputError(
             f"the units of a scene are two names, as in ('mm', 'MPa'); got {short(units)}."
         )
+    length, stress = units
+    if length in STRESSES or stress in LENGTHS:
+        raise InputError(
+            f"the units of a scene are that of length and then that of stress; {short(units)} are"
+            " in the other order."
+        )
     for what, name, known in zip(("length", "stress"), units, (LENGTHS, STRESSES)):
         if not isinstance(name, str) or not name.strip():
             raise InputError(f"the unit of {what} must have a name; got {short(name)}.")

@@ -192,11 +192,14 @@ class PathResult:
             rows.writerows(zip(*history.values()))
 
     def at(self, step: int) -> tuple[Reduction, Solution]:
-        """The reduction with the problem of a step, whose bodies carry the loads of the last state,
-        and the solution of the step.
-        """
+        """The reduction with the loads and the problem of a step, and the solution of the step."""
         state = self.states[step]
-        reduction = replace(self.reduction, problem=self.problem(step), scene=state.scene)
+        reduction = self.reduction
+        if step not in (-1, len(self.states) - 1):
+            reduction = reduction.loaded(state.scene)
+        reduction = replace(reduction, problem=self.problem(step))
+        if state.bodies:  # of thin bodies, too, which the ground of the last state holds
+            reduction.keep(state.solution, state.bodies)
         return reduction, state.solution
 
     def write(self, out: str | Path) -> None:

@@ -133,7 +133,9 @@ def read_known(folder: str | Path) -> Known:
             " run, or the run was stopped before it had anything to keep."
         ) from error
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise InputError(f"'{file}' cannot be read: {type(error).__name__}; start anew.") from error
+        why = getattr(error, "strerror", None)
+        why = f"cannot be read ({why})" if why else "is damaged"
+        raise InputError(f"'{file}' {why}; run the scene anew, without it.") from error
 
 
 @dataclass
@@ -244,5 +246,9 @@ def make_restart(
         return Restart(file, None, path)
     known = read_known(file.parent)
     if known.complete:
-        raise InputError(f"the run in '{out}' is complete; to start another from it, take start.")
+        raise InputError(
+            f"the run in '{out}' is complete, with the scene and the numbers that it was given; for"
+            f" other ones start another run from it: --start {out}, in Python start='{out}', with"
+            " another folder to write into."
+        )
     return Restart(file, known, path)
