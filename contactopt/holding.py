@@ -46,6 +46,7 @@ from contactopt.accuracy.marking import divisible, finer, with_bent_edges
 from contactopt.bodies.views import energy
 from contactopt.cards import force_unit
 from contactopt.coupling.reduction import Reduction, reduce_bodies
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError, Unbalanced
 from contactopt.linear.operators import dense
 from contactopt.methods.driver import solve
@@ -66,7 +67,6 @@ PUSHES = 20  # so that the last one is 1e12 times the first
 STEADY = 1e-5  # relative growth of the force below which it no longer grows
 ALIKE = 1e-3  # relative difference by which forces are a multiple of others, or two limits the same
 AWAY = "slide away, tip over or lift off"
-NOTHING = 1e-9  # of the forces of the contacts: a load that is rounding
 WAYS = {
     "statics": "the largest one that forces in the friction cones balance, confirmed by a push",
     "bound": "a bound: forces in the friction cones balance no larger one",
@@ -289,7 +289,7 @@ class _Push:
         """From the reduced scene without and with the load; None if it moves nothing freely."""
         load = loaded.problem.s - base.problem.s
         size = np.abs([loaded.problem.s, base.problem.s]).max(initial=0.0)
-        if not np.abs(load).max(initial=0.0) > NOTHING * size:
+        if not np.abs(load).max(initial=0.0) > EQUAL * size:
             return None
         bodies = zip(base.bodies, loaded.bodies)
         work = [
@@ -300,7 +300,7 @@ class _Push:
     @property
     def nothing(self) -> float:
         """The factor on the load that is rounding beside the loads that stay."""
-        return float(NOTHING * (1 + np.abs(self.problem.s).sum() / np.linalg.norm(self.load)))
+        return float(EQUAL * (1 + np.abs(self.problem.s).sum() / np.linalg.norm(self.load)))
 
     def end(self, largest: bool) -> float:
         """An end of the interval of statics, infinite if it has none; not a number if it is

@@ -4,14 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import two_blocks
-from skfem import MeshQuad
 
 from contactopt import Contact, InputError, Plate, Rigid, cli, run, scenes, solve
 from contactopt.accuracy import everywhere, loop, refine
 from contactopt.accuracy.everywhere import best_order, mesh_error, remainder
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.material import Material
-from contactopt.meshes.mesh_refinement import split
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.readings.peaks import Reading, at_rim
 from contactopt.readings.quantities import ROWS, Quantity, value_of
@@ -84,12 +82,6 @@ def test_split_keeps_boundaries_and_puts_nodes_on_the_arc():
     sagitta = 400 - np.sqrt(400**2 - (20 / 16) ** 2)
     assert np.abs(z - (400 - np.sqrt(400**2 - x**2))).max() < 1e-4 * sagitta
     assert np.allclose(np.diff(np.sort(x))[:10], 20 / 16)
-
-
-def test_split_of_a_flat_mesh_stays_flat():
-    mesh = MeshQuad().with_boundaries({"contact": lambda x: x[1] == 0}).refined(2)
-    fine = split(mesh, {})
-    assert np.ptp(fine.p[1, np.unique(fine.facets[:, fine.boundaries["contact"]])]) == 0
 
 
 # Quantities

@@ -16,7 +16,6 @@ from contactopt.accuracy.corners import grows
 from contactopt.accuracy.indicators import element_errors, pressure_errors, read_once
 from contactopt.cli import main
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.meshes.mesh_refinement import bent, boundary_curves
 from contactopt.readings.corners import filled, re_entrant
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
@@ -102,33 +101,6 @@ def test_shares_of_the_full_angle():
     lshaped = skfem.MeshTri.init_lshaped().refined(2)
     origin = int(np.argmin(np.linalg.norm(lshaped.p, axis=0)))
     assert filled(lshaped, origin) == pytest.approx(3 / 4) and re_entrant(lshaped, origin)
-
-
-def test_four_chords_stand_for_their_arc():
-    angle = np.linspace(0, np.pi / 2, 5)
-    polar = skfem.MeshTri.init_tensor(np.linspace(1, 2, 3), angle)
-    mesh = skfem.MeshTri(polar.p[0] * np.array([np.cos(polar.p[1]), np.sin(polar.p[1])]), polar.t)
-    mesh = mesh.with_boundaries(
-        {"inner": mesh.facets_satisfying(lambda x: np.hypot(*x) < 1.1, True)}
-    )
-    between = 0.97 * np.array([np.cos(angle[:-1] + 0.1), np.sin(angle[:-1] + 0.1)])
-    placed = boundary_curves(mesh)["inner"](between)
-    assert np.allclose(np.linalg.norm(placed, axis=0), 1.0, atol=1e-12)
-
-
-def test_bent_edges_follow_the_circle():
-    """The area of a disc of triangles, with straight edges and with edges along its circle."""
-    disc = skfem.MeshTri.init_circle(2)
-    mesh = disc.with_boundaries({"rim": disc.boundary_facets()})
-    curved = bent(mesh, {"rim": boundary_curves(mesh)["rim"]})
-    straight, along = (
-        skfem.Basis(made, skfem.ElementTriP1(), intorder=4).dx.sum() for made in (mesh, curved)
-    )
-    assert abs(straight / np.pi - 1) > 0.02 and abs(along / np.pi - 1) < 2e-4
-    assert np.array_equal(curved.boundaries["rim"], mesh.boundaries["rim"]) and np.array_equal(
-        curved.t, mesh.t
-    )
-    assert bent(mesh, {}) is mesh
 
 
 def test_a_quarter_model_whose_nodes_do_not_match_knows_its_planes():

@@ -16,7 +16,7 @@ from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
 from contactopt.accuracy.marking import divisible, left_out
 from contactopt.bodies.views import recovery_errors
-from contactopt.meshes.mesh_refinement import boundary_curves, divide, slivers
+from contactopt.meshes.mesh_refinement import divide, slivers
 from contactopt.meshes.structured import simplices
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
@@ -63,26 +63,6 @@ def test_divided_meshes_are_whole_and_keep_their_boundaries(kind):
         inside = np.setdiff1d(np.arange(mesh.nfacets), mesh.boundary_facets())
         # no hanging nodes: every inner facet has two elements
         assert np.all(mesh.f2t[1, inside] >= 0)
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.7, 2.5])
-def test_new_nodes_lie_on_the_curved_boundary(turn):
-    angle = np.linspace(0, np.pi, 9) + turn
-    disc = skfem.MeshTri.init_circle(3)
-    mesh = disc.with_boundaries({"arc": disc.boundary_facets()})
-    curve = boundary_curves(mesh)["arc"]
-    between = 0.98 * np.array([np.cos(angle), np.sin(angle)])
-    assert np.allclose(np.linalg.norm(curve(between), axis=0), 1, atol=1e-5)
-    for _ in range(3):
-        mesh = divide(mesh, np.arange(0, mesh.nelements, 3), {"arc": curve})
-        nodes = np.unique(mesh.facets[:, mesh.boundaries["arc"]])
-        assert np.allclose(np.linalg.norm(mesh.p[:, nodes], axis=0), 1, atol=1e-5)
-
-
-def test_corners_stay_corners():
-    square = skfem.MeshTri.init_tensor(TICKS, TICKS)
-    square = square.with_boundaries({"all": square.boundary_facets()})
-    assert boundary_curves(square)["all"] is None
 
 
 def pressed_block(n):

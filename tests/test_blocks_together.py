@@ -68,6 +68,15 @@ CASES = {
         ((0, 0.3, 2 / 3), (1, 1, 2), (2, 1, 2), "tri"),
         laws=("frictionless",),
     ),
+    "an edge in space exchanges forces": blocks(
+        ((0, 0, 0), (0.5, 1, 1), (1, 1, 1), "tri"),
+        ((0.5, 0, 0), (1, 1, 0.33), (1, 1, 1), "quad"),
+        ((0.5, 0, 0.33), (1, 1, 0.67), (1, 1, 1), "quad"),
+        ((0.5, 0, 0.67), (1, 1, 1), (1, 1, 1), "quad"),
+        ((1, 0, 0), (1.5, 1, 1), (1, 1, 1), "tri"),
+        laws=("coulomb", "tied", "coulomb", "frictionless", "tied"),
+        degree=2,
+    ),
     "ties of one element": blocks(
         ((0, 0), (2, 0.4), (6, 1), "quad"),
         ((0, 0.4), (0.5, 0.9), (1, 1), "quad"),

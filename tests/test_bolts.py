@@ -47,6 +47,40 @@ def clamp(mesh=MeshHex, turned=None, loads=((), ()), bolts=None, kind="solid", a
     return Scene("clamp", *parts, MU, kind=kind, bolts=bolts)
 
 
+def test_a_scene_lists_its_bolts():
+    """As they are now: a copy of the scene keeps them, and a changed force is that of the list."""
+    assert clamp().bolts == ()
+    bolted = clamp(bolts=(Bolt(FACES, F, "m4", False), Bolt(FACES, 2 * F, direction=(0, 0, 1))))
+    one, two = bolted.bolts
+    assert one == Bolt(FACES, F, "m4", False)
+    assert two == Bolt(FACES, 2 * F, "bolt2", direction=(0, 0, 1))
+    assert replace(bolted, mu=0.1).bolts == bolted.bolts
+    assert replace(clamp(), bolts=tuple(bolted.bolts)).bolts == bolted.bolts
+    assert replace(bolted, bolts=()).bolts == ()
+    changed = bolted.with_parts(
+        lambda part: replace(part, loads=tuple(load.with_values({"": 3.0}) for load in part.loads))
+    )
+    assert [own.force for own in changed.bolts] == [3.0, 3.0]
+
+
+def test_stiff_bolts_whose_faces_share_nodes_are_named():
+    bolts = Bolt(FACES, F, "m4", False), Bolt(FACES, F, "m5", False)
+    words = (
+        "the bolt 'm4' and bolt 'm5', whose face 'head' stays parallel, moves in x, but the same"
+    )
+    with pytest.raises(InputError, match=words):
+        contactopt.reduce(clamp(bolts=bolts))
+    scene = clamp()
+    mesh = scene.upper.mesh.with_boundaries({"beside": lambda x: (x[2] == 2) & (x[0] > 1.49)})
+    scene = replace(scene, upper=replace(scene.upper, mesh=mesh))
+    both = bolts[0], Bolt(("up.beside", "down.nut"), F, "m5", False, (0, 0, 1))
+    words = (
+        "the bolt 'm5', whose face 'beside' .* but the bolt 'm4', whose face 'head' .*let a bolt"
+    )
+    with pytest.raises(InputError, match=words):
+        contactopt.reduce(replace(scene, bolts=both))
+
+
 @pytest.mark.parametrize("tilting", [True, False])
 @pytest.mark.parametrize(
     "mesh, kind", [(MeshHex, "solid"), (MeshTet, "solid"), (MeshQuad, "plane-strain"),

@@ -16,27 +16,6 @@ from contactopt.problem.cones import coulomb_cone, coulomb_cone_derivative
 from contactopt.problem.laws.bilateral import Bilateral
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_derivative_of_the_cone_projection(dim):
-    """Against difference quotients, in the cone, in its polar and between; mu = 0 among the
-    coefficients.
-    """
-    rng = np.random.default_rng(0)
-    y, mu = (
-        rng.normal(size=(60, dim)),
-        np.where(np.arange(60) % 5 == 0, 0.0, rng.uniform(0.1, 1.5, 60)),
-    )
-    P, D = coulomb_cone_derivative(y, mu)
-    assert np.array_equal(P, coulomb_cone(y, mu))
-    for j in range(dim):
-        step = 1e-7 * np.eye(dim)[j]
-        assert np.allclose(
-            D[:, :, j], (coulomb_cone(y + step, mu) - coulomb_cone(y - step, mu)) / 2e-7, atol=1e-6
-        )
-    ranks = np.linalg.matrix_rank(D)
-    assert {0, 1, dim} <= set(ranks.tolist())
-
-
 def test_derivative_on_the_axis_without_friction_does_not_divide_by_zero():
     _, D = coulomb_cone_derivative(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), np.zeros(2))
     assert np.array_equal(D, [np.diag([1.0, 0, 0]), np.zeros((3, 3))])

@@ -52,6 +52,10 @@ CALQUES = (
     r"\bsolvers? knows? no\b",
     r"\bunit\S* says? it of\b",
     r"\b(?:contacts?|problems?) in the space\b",
+    r"\b(?:set|file|mesh|solver)s? of yours\b",
+    r"\bstands? at the head of\b",
+    r"\bnumbered from \d+ on\b",
+    r"\bis of the order of the elements\b",
 )
 FOLDERS = ("contactopt", "experiments/site", "experiments/course", "experiments/tutorials")
 KINDS = {".py", ".md", ".toml", ".js", ".html"}

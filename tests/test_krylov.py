@@ -18,7 +18,6 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.assembled import Work
-from contactopt.coupling.compliance import estimate_diagonal
 from contactopt.coupling.costs import AGAIN, estimates
 from contactopt.linear.operators import (
     InterfaceOperator,
@@ -34,7 +33,6 @@ from contactopt.methods.kernels.subproblems import KrylovSubproblem
 from contactopt.methods.newton import Newton
 from contactopt.methods.preconditioners import degrees
 from contactopt.problem import dimensionless
-from contactopt.problem.chart import Chart, nodal_weights
 from contactopt.scenes import make_scene
 from contactopt.solving.solve_scene import Options
 from contactopt.solving.zone import solve_zone
@@ -86,30 +84,6 @@ def test_estimated_diagonal_is_near_the_true_one_and_zero_where_nothing_moves(na
     assert np.array_equal(estimate == 0, true == 0)
     ratio = estimate[true > 0] / true[true > 0]
     assert ratio.min() > 0.2 and ratio.max() < 5
-
-
-def test_trace_of_a_diagonal_operator_is_exact():
-    d = np.array([1.0, 2.0, 3.0, 0.0])
-    estimate = estimate_diagonal(lambda X, accuracy: d[:, None] * X, [np.ones(2)], d > 0)
-    assert estimate.sum() == pytest.approx(6.0) and estimate[3] == 0
-
-
-def test_nodal_weights_of_even_nodes_are_even():
-    x = np.linspace(0, 1, 5)
-    areas = np.array([0.5, 1, 1, 1, 0.5])
-    assert np.allclose(nodal_weights(Chart(x[None], (False,)), areas), 1.0)
-    order = [3, 1, 4, 0, 2]
-    assert np.allclose(nodal_weights(Chart(x[None, order], (False,)), areas[order]), 1.0)
-
-
-def test_nodal_weights_around_a_closed_line():
-    """Nodes of a circle with areas half the way to both neighbours: w^2 = 1/2 everywhere, whatever
-    the spacing.
-    """
-    x = np.sort(np.random.default_rng(0).random(9)) * 5
-    steps = np.diff(np.append(x, x[0] + 5))
-    areas = (steps + np.roll(steps, 1)) / 2
-    assert np.allclose(nodal_weights(Chart(x[None], (False,), 5.0), areas), 1.0)
 
 
 @pytest.mark.parametrize("name", SMALL)

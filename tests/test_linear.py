@@ -19,13 +19,10 @@ from contactopt.bodies.solvers import SOLVERS, choose, make_solver, multigrid, s
 from contactopt.bodies.solvers import sparse_products as products
 from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM, RTOL
 from contactopt.bodies.solvers.multigrid import (
-    _near,
-    _pattern,
     conjugate_gradients,
     nodal_blocks,
-    rigid_motions,
 )
-from contactopt.bodies.solvers.ordering import elimination_order, minimum_degree, nested_dissection
+from contactopt.bodies.solvers.ordering import elimination_order
 from contactopt.bodies.solvers.sparse_products import SparseProduct
 from contactopt.bodies.solvers.system import Block, System
 from contactopt.errors import BackendError, InputError
@@ -187,28 +184,6 @@ def test_iterations_do_not_depend_on_units_and_vanish_without_load():
         assert cycles == answers[0][1] > 0
 
 
-def test_flat_elements_are_coarsened_along_their_short_side():
-    x, y = (c.ravel() for c in np.meshgrid(np.arange(5.0), 4.0 * np.arange(3), indexing="ij"))
-    points = np.stack([x, y])
-    touching = np.all(
-        np.abs(points[:, :, None] - points[:, None]) <= np.array([1.0, 4.0])[:, None, None], axis=0
-    )
-    A = sp.csr_matrix(np.kron(touching, np.ones((2, 2)))).tobsr((2, 2))
-    near = _pattern(A, _near(A, points))
-    expected = touching & (y[:, None] == y)
-    assert np.array_equal(near.toarray() > 0, expected)
-
-
-@pytest.mark.parametrize("dim, count", [(2, 3), (3, 6)])
-def test_rigid_motions_strain_nothing(dim, count):
-    scene = scenes.flat_punch(dim, elements=4)
-    body = build_body(scene, scene.lower, 4, None)
-    modes = np.zeros((len(body.load), count))
-    modes[np.asarray(body.basis.nodal_dofs).T.ravel()] = rigid_motions(body.basis.mesh.p)
-    assert np.linalg.matrix_rank(modes) == count
-    assert np.abs(body.A @ modes).max() <= 1e-12 * abs(body.A).max()
-
-
 @pytest.mark.parametrize("name", SOLVERS)
 def test_two_bodies_in_two_threads(name):
     systems = [BODIES["solid punch"], BODIES["solid foundation"]]
@@ -327,32 +302,6 @@ def test_elimination_orders_fill_less_than_either_textbook_order(dim, held):
     assert np.array_equal(order[len(order) - len(last) :], last)
     rows = np.concatenate([np.setdiff1d(np.arange(A.shape[0]), last), last])  # as numbered: a band
     assert fill(A, order) < 0.75 * fill(A, rows)
-
-
-def test_minimum_degree_fills_less_in_the_plane_and_nested_dissection_in_space():
-    for dim in (2, 3):
-        A, _, _, points, _ = grid(dim)
-        nodes = A[::2][:, ::2].tocsr()
-        degree, dissection = (
-            fill(nodes, minimum_degree(nodes)),
-            fill(nodes, nested_dissection(nodes, points)),
-        )
-        assert (degree < dissection) == (dim == 2), (degree, dissection)
-
-
-@pytest.mark.parametrize("precision", [np.float32, np.float64])
-@pytest.mark.parametrize("form", ["csr", "bsr"])
-def test_sparse_products_are_those_of_scipy(form, precision):
-    A = BODIES["solid foundation"].A
-    n = A.shape[0] // 3 * 3
-    A = A[:n][:, :n].astype(precision)
-    A = A.tobsr((3, 3)) if form == "bsr" else A
-    x = np.random.default_rng(0).standard_normal(n).astype(precision)
-    y = SparseProduct(A) @ x
-    assert y.dtype == precision
-    assert np.linalg.norm(y - A @ x) <= 10 * np.finfo(precision).eps * np.linalg.norm(
-        abs(A) @ abs(x)
-    )
 
 
 @pytest.mark.parametrize("form", ["csr", "bsr"])

@@ -38,7 +38,6 @@ from contactopt import (
 from contactopt.coupling.matrices import matrices_of, write_matrices
 
 E, NU = 70.0, 0.3
-SIMPLEX = {2: skfem.MeshTri, 3: skfem.MeshTet}
 BRICK = {2: skfem.MeshQuad, 3: skfem.MeshHex}
 ELEMENTS = {
     (skfem.MeshTri, 1): skfem.ElementTriP1, (skfem.MeshTri, 2): skfem.ElementTriP2,

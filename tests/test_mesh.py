@@ -8,9 +8,6 @@ from contactopt.meshes.structured import (
     contact_grid,
     graded,
     half_sphere_section,
-    patch,
-    rename,
-    tensor_mesh,
 )
 
 
@@ -25,13 +22,6 @@ def test_graded_grids_end_where_they_should_and_grow_slowly(length, fraction, gr
     assert steps[0] <= fraction * length * (1 + 1e-9)
 
 
-def test_contact_grid_is_uniform_on_the_contact():
-    grid = contact_grid(2.0, 8, 20.0, 1.3)
-    assert np.allclose(grid[:9], np.linspace(0, 2, 9))
-    assert grid[-1] == pytest.approx(20.0)
-    assert np.array_equal(contact_grid(2.0, 4, 2.0, 1.3), np.linspace(0, 2, 5))
-
-
 def test_half_sphere_section_is_a_quarter_disc_with_positive_elements():
     radius = 50.0
     grid = contact_grid(4.0, 16, radius / np.sqrt(2), 1.2)
@@ -44,10 +34,3 @@ def test_half_sphere_section_is_a_quarter_disc_with_positive_elements():
     assert np.allclose(np.hypot(arc[0], arc[1] - radius), radius)
     assert np.allclose(mesh.p[0, mesh.facets[:, mesh.boundaries["axis"]]], 0)
     assert np.allclose(mesh.p[1, mesh.facets[:, mesh.boundaries["top"]]], radius)
-
-
-def test_boundaries_of_a_box_and_a_patch_of_one():
-    mesh = rename(tensor_mesh(*[np.linspace(0, 1, 5)] * 3), top="z+", bottom="z-")
-    assert {"top", "bottom"} <= set(mesh.boundaries)
-    mesh = patch(mesh, "top", "contact", [0.5, 0.25])
-    assert len(mesh.boundaries["contact"]) == 2 and len(mesh.boundaries["top"]) == 16

@@ -19,46 +19,9 @@ from contactopt import (
 from contactopt.benchmark.families.of_scenes import tangential
 from contactopt.benchmark.families.packings import rigid_bodies
 from contactopt.methods.kernels.bonded import Bonded
-from contactopt.methods.kernels.semismooth import Equations, Factored, evaluated
-from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.scenes import make_scene
 
 SMALL = {"punch-2d": 16, "punch-3d": 5, "sphere": 12}
-
-
-@pytest.mark.parametrize("p", [0, 1])
-def test_newton_step_solves_the_linearised_equations(p):
-    """Both ways of solving it, against the full system written out."""
-    rng = np.random.default_rng(5)
-    k, d = 7, 3
-    A = rng.normal(size=(k * d, k * d))
-    Q, V = A @ A.T / 10 + np.eye(k * d), rng.normal(size=(k * d, p))
-    rho, mu = rng.uniform(0.5, 2, k), np.full(k, 0.6)
-    equations = Equations(
-        Q, rng.normal(size=(k, d)), V, rng.normal(size=p), Coulomb(mu).project, rho
-    )
-    r, lam = rng.normal(size=(k, d)) + np.eye(d)[0], rng.normal(size=p)
-    at = evaluated(equations, r, lam)
-    error, balance, D = at.error, at.balance, at.D
-    # open and closed contacts both occur
-    assert {0.0} < {float(np.abs(block).max()) for block in D}
-    big, scale = la.block_diag(*D), np.repeat(rho, d)
-    full = np.block(
-        [
-            [
-                np.eye(k * d) - big @ (np.eye(k * d) - scale[:, None] * Q),
-                big @ (scale[:, None] * V),
-            ],
-            [V.T, np.zeros((p, p))],
-        ]
-    )
-    expected = np.linalg.solve(full, np.concatenate([error.ravel(), -balance]))
-    for dr, dlam in (
-        Factored(block_matrix(Q, d))(equations, at, ridge=0.0),
-        Bonded(Q, V).step(rho, error, balance, D),
-    ):
-        assert np.allclose(np.concatenate([dr.ravel(), dlam]), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", SMALL)

@@ -3,11 +3,9 @@ import pytest
 
 from contactopt import InputError, InterfaceProblem, solve
 from contactopt.methods.augmented_lagrangian import AugmentedLagrangian
-from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.lagrangian import Lagrangian
 from contactopt.methods.penalty import Penalty
 from contactopt.problem import dimensionless, natural_map_residual
-from contactopt.problem.cones import coulomb_cone_derivative, cylinder_derivative, disc_derivative
 
 EXACT = {
     "lagrangian": Lagrangian(),
@@ -101,30 +99,6 @@ def test_the_error_of_multipliers_falls_by_one_plus_rho_times_the_eigenvalue():
 def test_settings_without_sense(wrong):
     with pytest.raises(InputError):
         wrong()
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-@pytest.mark.parametrize("law", ["cone", "cylinder", "disc"])
-def test_balanced_projection_is_the_nearest_balanced_point(law, dim):
-    """No balanced point of the set is nearer to y than it is: checked against many others."""
-    rng = np.random.default_rng(0)
-    k, step = 7, 0.3
-    mu = np.where(np.arange(k) == 0, 0.0, 0.6)
-    project = {
-        "cone": lambda y: coulomb_cone_derivative(y, mu),
-        "cylinder": lambda y: cylinder_derivative(y, mu),
-        "disc": lambda y: disc_derivative(y, mu),
-    }[law]
-    V = rng.normal(size=(k * dim, 2))
-    s = -V.T @ project(rng.normal(size=(k, dim)) + 0.5)[0].ravel()
-    balanced = lambda y: project_balanced(project, y, V, s, step, np.zeros(2))[0]  # noqa: E731
-    y = rng.normal(size=(k, dim))
-    r = balanced(y)
-    assert np.allclose(V.T @ r.ravel(), -s, atol=1e-10)
-    assert np.allclose(project(r)[0], r, atol=1e-12)
-    for _ in range(30):
-        other = balanced(3 * rng.normal(size=(k, dim)))
-        assert np.sum((y - r) * (other - r)) <= 1e-8
 
 
 def test_answers_do_not_depend_on_units(punch):

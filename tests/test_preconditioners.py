@@ -26,12 +26,9 @@ from contactopt.methods.preconditioners import (
     smooth_motions,
 )
 from contactopt.methods.preconditioners.circulant import (
-    extended,
-    inverse_of_extended,
     norm,
     seminorm,
 )
-from contactopt.methods.preconditioners.grid import Grid
 from contactopt.problem.chart import Chart
 
 SIZES = (17, 33, 65)  # contacts
@@ -129,29 +126,6 @@ def test_pcg_iterations_do_not_grow():
         x, failed = cg(problem.Q, load, rtol=1e-8, M=P, callback=steps.append)
         assert not failed and len(steps) <= 15
         assert np.linalg.norm(problem.Q @ x - load) <= 1.1e-8 * np.linalg.norm(load)
-
-
-@pytest.mark.parametrize("m", [4, 16, 64])
-def test_circulants_are_those_of_the_paper(m):
-    column = seminorm(m)
-    assert abs(column.sum()) < 1e-12  # a seminorm: constants are its kernel
-    assert np.count_nonzero(column) == 2 * int(np.log2(m)) + 1
-    assert column[1] == -1.0 and column[3] == pytest.approx(-(1 / 4 + 1 / 9))
-    assert np.all(np.fft.fft(column).real >= -1e-12)
-    assert np.allclose(
-        np.fft.fft(norm(m, 0.5)).real, 0.5 + 4 * (1 - np.cos(np.pi * np.arange(2 * m) / m))
-    )
-
-
-@pytest.mark.parametrize("k", [5, 16, 33])
-def test_products_are_those_of_the_dense_matrices(k):
-    m = int(2 ** np.ceil(np.log2(k)))
-    dense = la.circulant(seminorm(m))[:k, :k]
-    line = Grid((np.arange(float(k)),), np.zeros((2, 1, 2), bool), np.ones(k))
-    assert np.allclose(extended(line)[0](np.eye(k)), dense, atol=1e-13)
-    symbol = np.fft.fft(seminorm(m)).real / np.fft.fft(norm(m, 4 / (k - 1))).real
-    inner = la.circulant(np.fft.ifft(symbol).real)[:k, :k]
-    assert np.allclose(inverse_of_extended(line)[0](np.eye(k)) @ inner, np.eye(k), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ON_GRIDS)

@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from conftest import MATERIAL, block, two_blocks
 
 from contactopt import (
@@ -18,7 +17,6 @@ from contactopt import (
     scenes,
     solve,
 )
-from contactopt.bodies.solvers.ordering import nested_dissection
 from contactopt.coupling.back_to_bodies import recover
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
@@ -276,21 +274,3 @@ def test_a_plate_that_moves_along_the_contact():
     assert solution.reactions[:, 0].sum() == pytest.approx(3.0)
     assert solution.reactions[:, 1].sum() == pytest.approx(-0.5)
     assert solution.multipliers[0] > 0 > solution.multipliers[1]
-
-
-def test_nested_dissection_is_a_permutation_that_saves_fill():
-    from scipy.sparse.linalg import splu
-
-    n = 40
-    line = sp.diags([np.ones(n - 1), np.ones(n), np.ones(n - 1)], [-1, 0, 1])
-    graph = sp.kron(line, line).tocsr()
-    points = (
-        np.stack(np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
-        .reshape(2, -1)
-        .astype(float)
-    )
-    order = nested_dissection(graph, points)
-    assert np.array_equal(np.sort(order), np.arange(n * n))
-    A = graph + 10 * sp.eye(n * n)
-    fill = [splu(A[p][:, p].tocsc(), permc_spec="NATURAL").L.nnz for p in (order, np.arange(n * n))]
-    assert fill[0] < 0.7 * fill[1]

@@ -60,6 +60,14 @@ def check_tables(result, out):
         assert list(last[f"{result.scene.components[0]} [{length}]"]) == pytest.approx(
             list(result.problem.coordinates[0][pair.contacts])
         )
+        meshes = {own.name: own.mesh for own in result.fields}
+        there = [name for name in meshes if f"node of {name}" in last]
+        assert there and any(last[f"node of {name}"].notna().all() for name in there)
+        for name in there:
+            rows = last[last[f"node of {name}"].notna()]
+            places = rows[[f"{axis} [{length}]" for axis in result.scene.components]].to_numpy().T
+            nodes = rows[f"node of {name}"].astype(int)
+            np.testing.assert_allclose(meshes[name].p[:, nodes], places, atol=1e-9)
     total = sum(history[name].iloc[-1] for name in history if name.startswith("force:body"))
     assert np.isfinite(total)
 

@@ -3,46 +3,12 @@ import pytest
 
 from contactopt.methods.kernels.semismooth import Equations, Factored, crossover, evaluated
 from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.problem.cones import disc_derivative, half_line_derivative
+from contactopt.problem.cones import half_line_derivative
 
 
 def spd(n, seed=0):
     A = np.random.default_rng(seed).normal(size=(n, n))
     return A @ A.T / n + 0.3 * np.eye(n)
-
-
-def test_a_rough_normal_force_becomes_exact():
-    n = 12
-    rng = np.random.default_rng(3)
-    Q, exact, gap = spd(n), rng.uniform(0.5, 2, n), np.zeros(n)
-    exact[::3], gap[::3] = 0.0, rng.uniform(0.1, 1, 4)
-    c = gap - Q @ exact + 0.7  # multiplier -0.7 of the balance row
-    V, s = np.ones((n, 1)), -np.array([exact.sum()])
-    rough = np.maximum(0, exact + 1e-2 * rng.normal(size=n))[:, None]
-    r, lam = crossover(Q, c, V, s, half_line_derivative, rough, np.zeros(1))
-    assert np.allclose(r[:, 0], exact, atol=1e-13) and lam[0] == pytest.approx(-0.7, abs=1e-12)
-
-
-@pytest.mark.parametrize("d", [1, 2])
-def test_a_rough_tangential_force_becomes_exact(d):
-    k = 10
-    rng = np.random.default_rng(4)
-    radius = rng.uniform(0.2, 1, k)
-    radius[0] = 0.0
-    exact = rng.normal(size=(k, d))
-    exact *= (radius * rng.uniform(0.2, 0.9, k) / np.linalg.norm(exact, axis=1))[:, None]
-    slip = np.zeros((k, d))
-    sliding = np.arange(k) % 2 == 0
-    exact[sliding] *= (radius / np.maximum(np.linalg.norm(exact, axis=1), 1e-300))[sliding, None]
-    slip[sliding] = -exact[sliding] * rng.uniform(0.5, 2, (k, 1))[sliding]
-    Q = spd(k * d, 1)
-    c = slip.ravel() - Q @ exact.ravel()
-    none = np.zeros((k * d, 0))
-    rough = exact + 1e-2 * rng.normal(size=(k, d))
-    r, _ = crossover(
-        Q, c, none, np.zeros(0), lambda y: disc_derivative(y, radius), rough, np.zeros(0)
-    )
-    assert np.allclose(r, exact, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))

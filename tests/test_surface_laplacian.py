@@ -15,7 +15,6 @@ from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
 from contactopt.methods.preconditioners.surface import (
     divergences,
-    inverse_root,
     laplacian,
     surface_matrices,
 )
@@ -117,28 +116,6 @@ def test_it_fits_half_spaces_under_any_surface(shape, size):
     assert condition(P, problem.Q) < 10
     assert iterations(P, problem.Q) <= 30
     assert iterations(None, problem.Q) > 1.3 * iterations(P, problem.Q)
-
-
-@pytest.mark.parametrize("low, high", [(1.0, 1.5), (1e-3, 1e2), (1.0, 1e8)])
-def test_the_rational_function_is_the_inverse_root(low, high):
-    c, s = inverse_root(low, high, 1e-6)
-    x = np.geomspace(low, high, 500)
-    assert np.all(s > 0)
-    assert np.abs(np.sqrt(x) * np.sum(c / (x[:, None] + s), axis=1) - 1).max() < 1e-6
-
-
-def test_matrices_of_a_surface():
-    points, cells = l_shape(3)
-    K, mass, shift, share = surface_matrices(points, cells)
-    assert np.allclose(K @ np.ones(len(mass)), 0.0, atol=1e-12)
-    x = points[0]
-    # |grad x|^2 over the area
-    assert x @ K @ x == pytest.approx(3.0) and mass.sum() == pytest.approx(3.0)
-    corner = np.argmin(np.abs(points.T - [0.0, 0.0]).sum(axis=1))
-    assert share[corner] == pytest.approx(0.75) and share.max() == pytest.approx(1.0)
-    two = np.concatenate([points, points + 5.0], axis=1)
-    both = surface_matrices(two, np.concatenate([cells, cells + len(mass)], axis=1))
-    assert np.allclose(both[2], shift[0]) and np.allclose(both[1], np.tile(mass, 2))
 
 
 def test_quadrilaterals_are_cut_both_ways():

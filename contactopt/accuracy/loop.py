@@ -16,7 +16,7 @@ from contactopt.accuracy.locally import Locally
 from contactopt.accuracy.marking import overlooked
 from contactopt.bounds import bounded
 from contactopt.checks import check_number
-from contactopt.defaults import TOL
+from contactopt.defaults import CLOSE, TOL
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.readings.peaks import Peak, Reading
@@ -35,7 +35,6 @@ WATCHED = 1.5
 SAME_PEAK = 8.0  # elements by which a peak moves at most from one mesh to the next
 UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
 TENTH = 0.1  # of the accuracy may be the solver's (experiments.questions.bounds)
-NEGLIGIBLE = 1e-6  # share of the areas of surfaces that overlap, by which they are the same
 ROUNDING = 1e-15  # least relative error: no reading is exact
 
 
@@ -286,7 +285,7 @@ class _Loop:
             part = f"{geometry:.1e} of the error is that of the geometry, since "
             said.append(f"{part if geometry > 0 else ''}{sentence}")
         overlap = overlap_share(self.solved.reduction, self.solved.solution)
-        if overlap > NEGLIGIBLE:
+        if overlap > CLOSE:
             said.append(
                 f"{overlap:.1e} of the error is that of small displacements, since curved surfaces"
                 " overlap as they are drawn, and their areas differ by as much"

@@ -14,6 +14,7 @@ import numpy as np
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.coupling.posed import Posed
+from contactopt.defaults import CLOSE
 from contactopt.scenes.scene import HalfSpace, Part, Scene
 
 # what the edge of contact is: it ends by itself, at a corner of a body, or nowhere;
@@ -35,7 +36,6 @@ SECONDS = {0: (0.015, 4e-5), 1: (0.06, 3e-4), 2: (0.06, 1.4e-3)}
 # error of a half-space for a body of some half-widths of contact: of the approach it falls with
 # this size, of the rest with its square
 BODY, SETTLING = 0.4, 0.6
-EVEN = 1e-6  # of the size of a surface, within which a gap is even; cosine of a right angle
 SAFETY = 1.5  # on the constants, for scenes of other shapes and materials
 SHARE = 0.01  # of the accuracy, which the tolerance of the solver may take
 
@@ -124,12 +124,12 @@ def edge_of(scene: Scene, made: Posed) -> str:
     """
     own = made.couplings[0]
     size = float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
-    if scene.zone is not None or float(np.ptp(own.gap)) > EVEN * size:
+    if scene.zone is not None or float(np.ptp(own.gap)) > CLOSE * size:
         return "free"
     normals = own.frames[:, 0]
     turned = float((normals @ normals[0]).min(initial=1.0))
     return (
         "none"
-        if turned < EVEN or (scene.kind == "axisymmetric" and abs(normals[0, 0]) > 0.5)
+        if turned < CLOSE or (scene.kind == "axisymmetric" and abs(normals[0, 0]) > 0.5)
         else "corner"
     )

@@ -21,7 +21,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from contactopt.benchmark.keys import COLUMNS, ENDS
-from contactopt.defaults import install
+from contactopt.defaults import TOL, install
 from contactopt.errors import InputError
 from contactopt.files.writing import check_folder, whole_file
 from contactopt.problem import Status
@@ -33,7 +33,6 @@ SCHEMA = 1  # of COLUMNS; a reader refuses newer ones
 
 STATUSES = {status.label: status.sentence for status in Status} | ENDS
 TYPES = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}  # in a table
-REFERENCE = 1e-8  # largest residual of a reference solution
 UNKNOWN = {"int": 0, "str": "", "float": np.nan, "bool": False}  # what stands for no value yet
 # columns that load() works out, or that older rows do not have
 LATER = "error", "calibration", "states", "bridge_seconds"
@@ -305,7 +304,7 @@ def _from_lines(path: Path) -> pd.DataFrame:
 
     rows = {row["key"]: {"states": 1} | row for row in lines(path)}  # one per run
     exact: dict[str, np.ndarray] = {}  # the best answer to each problem
-    good = [row for row in rows.values() if row["residual"] <= REFERENCE and row.get("answer")]
+    good = [row for row in rows.values() if row["residual"] <= TOL and row.get("answer")]
     for row in sorted(good, key=lambda row: row["residual"]):
         exact.setdefault(row["fingerprint"], _forces(row))
     for row in rows.values():

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
-from contactopt.bodies.assembly import Assembly
+from contactopt.bodies.assembly import Assembly, Matrices
 from contactopt.bodies.body import build_body
 from contactopt.bodies.corners import smooth_tilts
 from contactopt.bodies.elastic import ElasticBody, condense
@@ -17,19 +19,23 @@ from contactopt.bodies.elements import Trace, mean_normals
 from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.bodies.thickness import thin_facets
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve, check_curve
+from contactopt.scenes.matrix_part import MatrixPart
 from contactopt.scenes.scene import Part, Scene
-
-PLANE = 1e-9  # nodes lie in a plane within this fraction of the body's extent
 
 
 @dataclass(frozen=True, eq=False)
-class AssembledElastic(AssembledBody):
-    """An Assembly with its part of the scene."""
+class AssembledMatrices(AssembledBody):
+    """A body with a linear system, and its part of the scene."""
 
-    body: Assembly
-    part: Part
+    body: Matrices
+    part: Part | MatrixPart
+    if TYPE_CHECKING:
+
+        @property
+        def surfaces(self) -> Mapping[str, Surface]: ...
 
     @cached_property
     def name(self) -> str:
@@ -46,6 +52,23 @@ class AssembledElastic(AssembledBody):
     def iterates(self, solver: str) -> bool:
         return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
 
+    def surface(self, name: str | None = None) -> Surface:
+        name = name or self.part.contact
+        if name not in self.surfaces:
+            raise InputError(
+                f"body '{self.name}' has no contact surface {name!r}; it has"
+                f" {', '.join(sorted(self.surfaces))}."
+            )
+        return self.surfaces[name]
+
+
+@dataclass(frozen=True, eq=False)
+class AssembledElastic(AssembledMatrices):
+    """An Assembly with its part of the scene."""
+
+    body: Assembly
+    part: Part
+
     @cached_property
     def work(self) -> Work:
         """From the graph of all nodes, of which supports hold few."""
@@ -60,19 +83,11 @@ class AssembledElastic(AssembledBody):
             elimination_work(graph, body.locations, kept),
         )
 
-    def surface(self, name: str | None = None) -> Surface:
-        """The contact surface, with the places of its nodes on the curve that the part gives."""
-        name = name or self.part.contact
-        if name not in self.body.traces:
-            raise InputError(
-                f"body '{self.name}' has no contact surface {name!r}; it has"
-                f" {', '.join(sorted(self.body.traces))}."
-            )
-        return self._surfaces[name]
-
     @cached_property
-    def _surfaces(self) -> dict[str, Surface]:
-        """All of them, made once: a surface may take part in several pairs."""
+    def surfaces(self) -> dict[str, Surface]:
+        """All contact surfaces, made once: a surface may take part in several pairs. Their nodes
+        are placed on the curves that the part gives.
+        """
         return {name: self._surface(name) for name in self.body.traces}
 
     def _surface(self, name: str) -> Surface:
@@ -124,7 +139,7 @@ class AssembledElastic(AssembledBody):
         body, mesh = self.body, self.body.basis.mesh
         x = body.locations
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
-        near = PLANE * float(np.ptp(extent, axis=1).max())
+        near = EQUAL * float(np.ptp(extent, axis=1).max())
         planes = []
         for support in self.part.supports:
             given = support.displacement or {}

@@ -23,6 +23,7 @@ from contactopt.bodies.elements import (
     node_unknowns,
 )
 from contactopt.checks import place_words
+from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import CURVED, SHAPES
 
@@ -33,8 +34,6 @@ KINDS = {
 }  # fmt: skip
 BESIDE = 0.25  # of an edge: how far a node in the middle may lie from it
 DEPTH = 0.5  # of the size of a facet: how deep the element behind it is
-INSIDE = 1e-6  # of the size of a facet: nodes nearer to its plane lie in it
-FLAT = 1e-9  # of the longest edge squared: the area of a facet whose corners lie on a line
 
 
 class BareSurface(NamedTuple):
@@ -109,7 +108,7 @@ def turned_outwards(
     else:
         normal = np.cross(x[..., 1] - x[..., -1], x[..., 2] - x[..., 0], axis=0)
     length = np.linalg.norm(normal, axis=0)
-    flat = length <= FLAT * longest ** (len(points) - 1)
+    flat = length <= EQUAL * longest ** (len(points) - 1)
     if flat.any():
         place = place_words(middle[:, np.flatnonzero(flat)[0]])
         raise InputError(f"{what}: the facet at ({place}) has no area; its corners lie on a line.")
@@ -122,7 +121,7 @@ def turned_outwards(
     beneath = sp.coo_matrix(member @ coupled)
     apart = points[:, beneath.col] - middle[:, beneath.row]
     height = np.sum(apart * normal[:, beneath.row], axis=0) / longest[beneath.row]
-    chosen = (beneath.data > facets.shape[1] - 0.5) & (np.abs(height) > INSIDE)
+    chosen = (beneath.data > facets.shape[1] - 0.5) & (np.abs(height) > CLOSE)
     low, high = np.zeros(len(facets)), np.zeros(len(facets))
     np.minimum.at(low, beneath.row[chosen], height[chosen])
     np.maximum.at(high, beneath.row[chosen], height[chosen])

@@ -33,10 +33,12 @@ from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.bodies.thickness import thin_facets
 from contactopt.checks import check_size, place_words
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, joined, overlapping, split_twice, straight
 from contactopt.problem.laws import find_law
 from contactopt.scenes.loads import Load
+from contactopt.scenes.loads.bolt import stiff_faces
 from contactopt.scenes.loads.load import Face
 from contactopt.scenes.scene import Part, Scene
 
@@ -45,7 +47,6 @@ if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import MatrixPart
 
 CLOSED = 1e-3  # of the area of a face: the length of the integral of its normals that is none
-FLAT = 1e-9  # of the size of the body: how far the nodes of a plane lie from it
 
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
@@ -283,7 +284,7 @@ def _mirrored_nodes(
     size = float(np.ptp(mesh.p, axis=1).max())
     for axis in range(len(unknowns)):
         others = np.delete(fixed, axis, axis=0)
-        plane = np.all(fixed[axis], axis=0) & (np.ptp(places[axis], axis=0) < FLAT * size)
+        plane = np.all(fixed[axis], axis=0) & (np.ptp(places[axis], axis=0) < EQUAL * size)
         made[axis, np.unique(nodes[:, plane & ~np.any(np.all(others, axis=1), axis=0)])] = True
     return made
 
@@ -355,11 +356,7 @@ class Constraints:
             where = self.unknowns(plate.boundary, component)
             if component in plate.force:
                 if np.any(others[where]):
-                    raise InputError(
-                        f"body '{self.part.name}': the plate on {plate.boundary!r} moves in"
-                        f" {component}, but a support or another plate holds one of its nodes in"
-                        " that component."
-                    )
+                    raise self._held_twice(plate.boundary, component, where[others[where]])
                 self.columns.append(np.zeros(len(self.held)))
                 self.columns[-1][where] = 1.0
                 self.plate_forces.append(plate.force[component])
@@ -372,6 +369,18 @@ class Constraints:
                     f" which holds {component}; drop the plate or the support."
                 )
             self.hold(f"plate '{plate.boundary}'", where)
+
+    def _held_twice(self, boundary: str, component: str, where: np.ndarray) -> InputError:
+        """The error for a plate, or the stiff face of a bolt, that moves what another one holds."""
+        bolts = stiff_faces(self.scene.bolt_ends, self.part.name)
+        own = f"plate '{boundary}'"
+        other = next(n for n, held in self.holders.items() if np.isin(where, held).any())
+        tilt = "let a bolt tilt (tilting = true), or " if own in bolts or other in bolts else ""
+        return InputError(
+            f"body '{self.part.name}': the {bolts.get(own, own)} moves in {component}, but the"
+            f" {bolts.get(other, other) if other != own else 'same face'} holds one of its nodes"
+            f" in that component; {tilt}name faces that share no node."
+        )
 
     def add_all(self) -> Constraints:
         """Those of all supports and plates of the part."""

@@ -33,12 +33,12 @@ from contactopt.bodies.protocol import Body, FreeMotions, Seen, Way
 from contactopt.bodies.solvers import make_solver, solver_type
 from contactopt.bodies.solvers.system import Block, BodySolver, System
 from contactopt.bodies.thin import is_thin, on_ground
+from contactopt.defaults import EQUAL
 from contactopt.linear.operators import Product
 from contactopt.linear.saddle_point import BodyTerm
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
-RIGID = 1e-9  # forces below this fraction of those of a plate's motion are rounding
 KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
 
@@ -275,7 +275,7 @@ def _extended(
         np.abs((whole @ motion)[kept]).max(axis=0, initial=0.0)
         for motion in (extended, body.motion)
     )
-    strained = lacking > RIGID * forces
+    strained = lacking > EQUAL * forces
     if strained.any():
         extended[np.ix_(kept, strained)] -= solver.solve((whole @ extended[:, strained])[kept])
     # Rigid motions are multipliers of their own, so that plate motions have no part along them.

@@ -8,12 +8,12 @@ import skfem
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.elements import weight_at
 from contactopt.bodies.fields import PLACES, Fields, Validity, von_mises
+from contactopt.defaults import ROUNDED
 from contactopt.meshes.cells import SHAPES, second_order, straight
 from contactopt.scenes.kinds import Kind
 
 # elements whose shape functions are evaluated at a time, which bounds the memory that they take
 BLOCK = 2000
-ROUNDING = 1e-12  # share of |A| |U| below which internal forces A U are rounding
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0.0) -> Validity:
@@ -26,7 +26,7 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0
     applied = max(np.abs(part).sum() for part in (force, body.load, body.plate_forces))
     size = max(applied, np.abs(np.delete(internal, body.free)).sum())
     unbalanced = float(np.abs(missing[body.free]).sum() + np.abs(plates).sum())
-    rounding = ROUNDING * float((abs(body.A) @ np.abs(U)).sum())
+    rounding = ROUNDED * float((abs(body.A) @ np.abs(U)).sum())
     if applied <= least and size <= max(least, rounding):
         unbalanced = 0.0  # supports move the body as a whole: all forces are rounding
     gradient = _middle_gradient(body.basis, U)

@@ -33,9 +33,9 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefLine, RefQuad, RefTri
 
 from contactopt.checks import place_words
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.meshes.cells import SHAPES, is_curved
-from contactopt.meshes.mesh_repair import SAME
 
 _LINE = RefLine, skfem.ElementLineP1(), np.array([[0.0, 1.0, 0.5]])
 _TRIANGLE = RefTri, skfem.ElementTriP1(), np.array([[0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
@@ -239,7 +239,7 @@ def contact_trace(
 def unit(normals: np.ndarray) -> tuple[np.ndarray, int | None]:
     """Sums of normals (dim, k) made to unit length, and the first place where they cancel."""
     length = np.linalg.norm(normals, axis=0)
-    lost = np.flatnonzero(length <= SAME * length.max(initial=0.0))
+    lost = np.flatnonzero(length <= CLOSE * length.max(initial=0.0))
     return normals / np.where(length > 0, length, 1.0), int(lost[0]) if len(lost) else None
 
 

@@ -15,8 +15,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody, Guides, Mesh, Surface, Work
-from contactopt.bodies.assembled_elastic import PLANE, alone_of, trace_of
+from contactopt.bodies.assembled import Guides, Mesh, Surface, Work
+from contactopt.bodies.assembled_elastic import AssembledMatrices, alone_of, trace_of
 from contactopt.bodies.bare_facets import bare_surface, ordered, turned_outwards
 from contactopt.bodies.body import Constraints
 from contactopt.bodies.corners import smooth_tilts
@@ -29,9 +29,9 @@ from contactopt.bodies.matrix_checks import (
     numbered,
     without_stiffness,
 )
-from contactopt.bodies.solvers import solver_type
 from contactopt.bodies.solvers.ordering import elimination_work
 from contactopt.checks import place_words, real_array
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
 from contactopt.scenes.matrix_part import MatrixPart
@@ -46,28 +46,18 @@ class _SolvedBody(ElasticBody):
 
 
 @dataclass(frozen=True, eq=False)
-class MatrixBody(AssembledBody):
+class MatrixBody(AssembledMatrices):
     """The matrices of a MatrixPart with their part of the scene."""
 
     body: GivenMatrices
     part: MatrixPart
 
-    @cached_property
-    def name(self) -> str:
-        return self.body.name
-
-    @cached_property
-    def unknowns(self) -> int:
-        return len(self.body.free)
-
-    @cached_property
-    def held(self) -> np.ndarray:
-        return np.setdiff1d(np.arange(len(self.body.load)), self.body.free)
+    @property
+    def surfaces(self) -> Mapping[str, Surface]:
+        return self.body.surfaces
 
     def iterates(self, solver: str) -> bool:
-        if self.body.solves is not None:
-            return False
-        return solver_type(solver, self.unknowns, len(self.body.unknowns)).iterative
+        return self.body.solves is None and super().iterates(solver)
 
     @cached_property
     def work(self) -> Work:
@@ -82,22 +72,13 @@ class MatrixBody(AssembledBody):
         sizes = (elimination_work(graph, x, own) for own in (kept[:0], kept))
         return Work(body.A.nnz, len(body.contact_dofs), *sizes)
 
-    def surface(self, name: str | None = None) -> Surface:
-        name = name or self.part.contact
-        if name not in self.body.surfaces:
-            raise InputError(
-                f"body '{self.name}' has no contact surface {name!r}; it has"
-                f" {', '.join(sorted(self.body.surfaces))}."
-            )
-        return self.body.surfaces[name]
-
     def guides(self) -> Guides:
         """Coordinate planes, the body on one side, all of whose points are held along the axis, and
         not in all components.
         """
         body, x = self.body, self.body.locations
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
-        near = PLANE * float(np.ptp(extent, axis=1).max())
+        near = EQUAL * float(np.ptp(extent, axis=1).max())
         still = np.ones(len(body.load), dtype=bool)
         still[body.free] = False
         still, planes = (still & (body.prescribed == 0))[body.unknowns], []

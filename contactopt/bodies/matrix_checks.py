@@ -12,9 +12,10 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembly import Matrices
 from contactopt.bodies.elastic import ElasticBody
-from contactopt.bodies.motions import EXACT, Motions, kernel, motion_labels, rigid_fields
+from contactopt.bodies.motions import Motions, kernel, motion_labels, rigid_fields
 from contactopt.bodies.solvers.system import Act
 from contactopt.checks import real_array
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import Kind
 from contactopt.scenes.matrix_part import MatrixPart
@@ -57,7 +58,7 @@ def _numbering(
     tried = (np.diff(K.indptr) > 1) & sizes.any(axis=1)
     rows = loaded[tried & loaded.any(axis=1)]
     rows = rows / np.abs(rows).max(axis=1, keepdims=True)
-    gaps = gaps[np.abs(gaps).max(axis=1, initial=0.0) > EXACT]
+    gaps = gaps[np.abs(gaps).max(axis=1, initial=0.0) > EQUAL]
     rows = np.concatenate([rows, gaps])
     share = np.sum(tried & ~loaded.any(axis=1)) / max(tried.sum(), 1)
     still = ~loaded[:, : len(x)].any(axis=1)
@@ -145,7 +146,7 @@ def free_motions_of(
             )
         words = tuple(f"motion {number}" for number in range(1, 1 + Z.shape[1]))
         error = np.abs(K @ Z).max(axis=0) / (abs(K) @ np.abs(Z)).max(axis=0)
-        if np.any(error > EXACT) or np.any(Z[held]):
+        if np.any(error > EQUAL) or np.any(Z[held]):
             raise InputError(
                 f"body '{part.name}': {words[int(np.argmax(error))]} is not free: K or what is held"
                 " resists it; give motions with K Z = 0, zero where unknowns are held."

@@ -30,15 +30,11 @@ import skfem
 from skfem.helpers import dot
 
 from contactopt.bodies.elements import Weight, node_unknowns, weight_at
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import Kind
 
-# mean square of a motion (largest displacement one) over the held unknowns below which nothing
-# holds it
-HELD = 1e-12
-PURE = 1e-9  # by how much a motion may miss the free ones and still count as one of them
 BALANCED = 1e-13  # share of the work of all forces below which their sum is rounding
-EXACT = 1e-9  # largest |A Z| over |A| |Z|: a free motion strains nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +120,8 @@ def kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple
     """
     count = len(labels)
     values, vectors = np.linalg.eigh(held.T @ held)
-    kernel = vectors[:, values < HELD * len(held)] if len(held) else np.eye(count)
-    pure = np.flatnonzero(np.abs(1 - np.sum(kernel**2, axis=1)) < PURE)
+    kernel = vectors[:, values < ROUNDED * len(held)] if len(held) else np.eye(count)
+    pure = np.flatnonzero(np.abs(1 - np.sum(kernel**2, axis=1)) < EQUAL)
     columns = [np.eye(count)[:, i] for i in pure]
     rest = kernel - np.eye(count)[:, pure] @ kernel[pure]
     u, sizes, _ = np.linalg.svd(rest, full_matrices=False)
@@ -159,7 +155,7 @@ def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
     error = np.abs(A @ motions.fields).max(axis=0) / (
         np.abs(A.diagonal()).max() * np.abs(motions.fields).max(axis=0)
     )
-    if error.max() > EXACT:
+    if error.max() > EQUAL:
         raise InputError(
             f"body '{name}': its stiffness resists the rigid motion"
             f" '{motions.names[int(np.argmax(error))]}'; move the mesh nearer to the origin."

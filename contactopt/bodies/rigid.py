@@ -17,11 +17,11 @@ import scipy.sparse as sp
 from contactopt.bodies.assembled import Surface, UndividedBody
 from contactopt.bodies.protocol import Seen
 from contactopt.checks import real_array
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Rigid, Scene
 
 log = logging.getLogger(__name__)
-NEAREST = 1e-9  # contacts are as near as the nearest one up to this fraction of the gaps
 FLAT = 1e-3  # normals of a surface that differ by less than this are one direction
 
 
@@ -95,7 +95,7 @@ class RigidBody(UndividedBody):
         """Refuse a normal away from the other body where they are nearest; `facing` (k,) is its
         cosine with the normal that the other body suggests.
         """
-        nearest = gap <= gap.min(initial=np.inf) + NEAREST * float(np.max(np.abs(gap), initial=0.0))
+        nearest = gap <= gap.min(initial=np.inf) + EQUAL * float(np.max(np.abs(gap), initial=0.0))
         if (
             self.part.normal is not None
             and np.sum((facing * other.areas)[nearest]) < -FLAT * other.areas[nearest].sum()

@@ -40,6 +40,7 @@ from skfem.quadrature import get_quadrature
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.element_stress import stress_of
 from contactopt.bodies.fields import PLACES, Region
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import straight
 from contactopt.meshes.structured import simplices
@@ -47,7 +48,6 @@ from contactopt.meshes.structured import simplices
 # how far beyond an element a point may lie, over its size: an arc lies beyond a coarse mesh
 OUTSIDE = 0.2
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
-LEFT = 1e-9  # degrees of freedom that a fit leaves, below which it passes through all points
 STEEP = 12.0  # of the weights: `pytest tests/test_recovery.py -k hole`, error 0.08, with 0: 0.20
 
 
@@ -319,7 +319,7 @@ class PatchFit:
         left = own - np.sum(coefficients[self.row] * self.powers, axis=1)
         twice = _moments(self.powers.T, w**2, self.row, count)
         free = np.bincount(self.row, w, count) - np.einsum("mab,mab->m", self.inverse, twice)
-        variance = np.bincount(self.row, w * left**2, count) / np.where(free > LEFT, free, 1.0)
+        variance = np.bincount(self.row, w * left**2, count) / np.where(free > EQUAL, free, 1.0)
         return np.asarray(np.sqrt(np.bincount(self.row, self.weights**2, count) * variance))
 
 

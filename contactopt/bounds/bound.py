@@ -67,11 +67,10 @@ import numpy as np
 
 from contactopt.bodies.views import energy
 from contactopt.bounds.pressed_scene import PressedScene
-from contactopt.bounds.uneven_traction import uneven_traction
+from contactopt.bounds.uneven_traction import UNBALANCED, uneven_traction
 from contactopt.errors import InputError
 from contactopt.solving.solve_scene import Solved
 
-UNBALANCED = 1e-6  # of the force of an element: so much a vertex may be out of balance
 Data = list[Any]  # for every body what determines a composite stress; None for a rigid one
 
 

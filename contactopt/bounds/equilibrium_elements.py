@@ -37,11 +37,10 @@ from contactopt.bounds.displaced_stress import bilinear, displaced_stress
 from contactopt.bounds.least_in_balance import LeastInBalance
 from contactopt.bounds.simplices import Simplices
 from contactopt.bounds.split_triangle import PAIRS, SplitTriangle, split_triangle
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.material import Material
 
-NONE = 1e-9  # of the largest singular value, what is zero
 BLOCK = 1024  # elements at a time
-AXIS = 1e-12  # of the largest radius
 # integrals over an edge of the hat functions of its ends times the shape functions of its points
 LEVERS = {
     1: np.array([[2.0, 1.0], [1.0, 2.0]]) / 6,
@@ -204,7 +203,7 @@ class EquilibriumElements(Simplices):
     def _axis(self) -> np.ndarray:
         """(facets,) whether an edge lies on the axis."""
         r = self.mesh.p[0] if self.revolved else np.ones(self.mesh.nvertices)
-        return np.asarray(np.all(r[self.mesh.facets] <= AXIS * r.max(), axis=0))
+        return np.asarray(np.all(r[self.mesh.facets] <= ROUNDED * r.max(), axis=0))
 
     @cached_property
     def _numbers(self) -> tuple[np.ndarray, np.ndarray]:
@@ -334,7 +333,7 @@ class EquilibriumElements(Simplices):
             return Z[:, :-1], -force[1] * r.reshape(len(own), -1)[:, :-1]
         every, inner = split.nodes.reshape(-1, n), _without_tractions(split)
         _, left, order = qr((every @ inner).T, mode="economic", pivoting=True)
-        chosen = order[: np.count_nonzero(np.abs(left.diagonal()) > NONE)]
+        chosen = order[: np.count_nonzero(np.abs(left.diagonal()) > EQUAL)]
         wanted = -(self.back[own] @ force) * ratio[:, None]
         return (
             np.broadcast_to(every[chosen], (len(own), len(chosen), n)),
@@ -366,7 +365,7 @@ class EquilibriumElements(Simplices):
 
 def _without_tractions(split: SplitTriangle) -> np.ndarray:
     """(n, j) the composite stresses that have no tractions on the boundary."""
-    return null_space(split.tractions.reshape(-1, split.stress.shape[-1]), rcond=NONE)
+    return null_space(split.tractions.reshape(-1, split.stress.shape[-1]), rcond=EQUAL)
 
 
 def _compliance(material: Material) -> np.ndarray:

@@ -19,13 +19,12 @@ from skfem.refdom import RefLine, RefTri
 
 from contactopt.coupling.facing import Facets, facing_pairs
 from contactopt.coupling.segments import areas, clip
+from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part
 from contactopt.solving.solve_scene import Solved
 
-NEAR = 1e-6  # vertices and contacts coincide within this fraction of the surface
-FLAT = 1e-9  # by how much the normals of a flat contact surface differ
 SPLIT = {2: 16, 3: 4}  # parts of an edge of a contact facet for integrals over it
 PARTS = {2: 16, 3: 2}  # and of an edge of a piece of one
 FACING = -0.5  # the cosine between opposite normals is below this
@@ -76,7 +75,7 @@ class FacingFacets:
                 f"{name} has the law '{pair.law}'; a bound knows contact that may open, with"
                 " Coulomb's friction, with a given bound of friction, or without friction."
             )
-        if np.ptp(coupling.frames, axis=0).max() > FLAT:
+        if np.ptp(coupling.frames, axis=0).max() > EQUAL:
             raise InputError(f"{name} has a curved surface; a bound needs a flat one.")
         names = [part.name for part in scene.parts]
         self.sides: list[_Side] = []
@@ -125,7 +124,7 @@ class FacingFacets:
         there = np.bincount(
             self.rule.facets[0], self.rule.weights.sum(axis=1), self.contacts.shape[1]
         )
-        short = there < (1 - NEAR) * measures(self.points[0])
+        short = there < (1 - CLOSE) * measures(self.points[0])
         return np.setdiff1d(self.contacts[:, short], [-1])
 
     def of_contacts(self, values: np.ndarray) -> np.ndarray:
@@ -188,7 +187,7 @@ class FacingFacets:
         if self.revolved:
             r = self.points[number][0]
             for end in range(2):
-                on = r[end] <= FLAT * r.max()
+                on = r[end] <= EQUAL * r.max()
                 total = out[:, on].sum(axis=0)
                 out[end, on], out[1 - end, on] = total / 3, 2 * total / 3
         return out
@@ -204,7 +203,7 @@ def joined_points(points: Sequence[np.ndarray], frame: np.ndarray) -> tuple[Poin
     first, second = _meeting(own, other)
     corners, number = _common(own[first], other[second])
     size, whole = _sizes(corners), _sizes(own)
-    there = size > NEAR ** (d - 1) * whole[first[number]]
+    there = size > CLOSE ** (d - 1) * whole[first[number]]
     corners, facets = corners[there], np.stack([first, second])[:, number[there]]
     area = size[there] * (measures(points[0]) / whole)[facets[0]]
 
@@ -221,7 +220,7 @@ def joined_points(points: Sequence[np.ndarray], frame: np.ndarray) -> tuple[Poin
     np.maximum.at(best, first, inside)
     every, x = np.repeat(np.arange(len(x)), x.shape[1]), x.reshape(-1, 1, d - 1)
     shares = [_shares(own[every], x), _shares(other[found.ravel()], x)]
-    faced = (best.reshape(-1, 1) >= -NEAR).astype(float)
+    faced = (best.reshape(-1, 1) >= -CLOSE).astype(float)
     nodes = Points(np.stack([every, found.ravel()]), np.stack(shares), faced)
     return (
         pieces(*facet_rule(d, PARTS[d])),
@@ -284,7 +283,7 @@ def _side(
     """The facets of a body, whose vertices find their contacts along the normal."""
     vertices, plane = mesh.facets[:, facets], frame[1:]
     away, contacts = cKDTree((plane @ places).T).query((plane @ mesh.p[:, vertices.ravel()]).T)
-    contacts = np.where(away > NEAR * np.ptp(places, axis=1).max(), -1, contacts)
+    contacts = np.where(away > CLOSE * np.ptp(places, axis=1).max(), -1, contacts)
     return _Side(*body, facets, vertices, _nodes(mesh, vertices), contacts.reshape(vertices.shape))
 
 

@@ -50,6 +50,7 @@ import numpy as np
 from contactopt.bounds.facing_facets import FacingFacets, facet_nodes
 from contactopt.bounds.pressed_scene import PressedScene
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import EQUAL
 from contactopt.derivatives.states import Duals, duals_of
 from contactopt.errors import InputError
 from contactopt.problem.laws import find_law
@@ -59,7 +60,6 @@ from contactopt.readings.state import State
 if TYPE_CHECKING:
     from contactopt.bounds.bound import Bound
 
-ALL = 1e-9  # by how much shares that add up to one may miss it, and slack that is none
 TINY, HUGE = 1e-200, 1e200
 TRIED = 3  # adjoints of a quantity, each with what the one before tells
 ENERGY = "energy"
@@ -138,7 +138,7 @@ def without_interval(reduction: Reduction, quantity: Quantity) -> str:
 def _slack(scene: PressedScene) -> np.ndarray:
     """(k,) by how much the shear is less than the friction bound, zero where it slips."""
     slack = scene.limit - np.linalg.norm(scene.tractions[:, 1:], axis=1)
-    return np.where(slack > ALL * scene.limit, slack, 0.0)
+    return np.where(slack > EQUAL * scene.limit, slack, 0.0)
 
 
 def _least_constant(scene: PressedScene, t: np.ndarray) -> float:
@@ -211,7 +211,7 @@ def _shear_by_pressure(
     if find_law(law).proportional:
         mu = scene.problem.law.bound(np.ones(len(scene.limit)))
         mu = np.broadcast_to(mu, len(scene.limit))[pair.contacts[pair.contacts >= 0]]
-        if np.ptp(mu) > ALL * mu.max():
+        if np.ptp(mu) > EQUAL * mu.max():
             raise InputError("there is no bound where the friction coefficient varies.")
         return mu.max() * direction, 0.0
     y = pair.jump(z, pair.rule, True)[1] + pair.at_points(omega, pair.rule)
@@ -237,7 +237,7 @@ def _with_gap(
     gap = np.maximum(pair.jump(bound.displacement, pair.nodes)[0], 0.0)
     change = pair.jump(z, pair.nodes, True)
     value = change[0] + weights[0] - turned * (change[1] + weights[1])
-    most = np.where(pressed @ nodes > 1 - ALL, 0.0, limit * gap)
+    most = np.where(pressed @ nodes > 1 - EQUAL, 0.0, limit * gap)
     wanted = np.clip(value, -most, most)
     for node, ends in enumerate(combinations(range(d), 2), d):
         for end, other in (ends, ends[::-1]):  # next to the pressure in proportion

@@ -15,7 +15,6 @@ from contactopt.bodies.views import elements_of
 from contactopt.bounds.displaced_stress import Halves, halved
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
 from contactopt.bounds.facing_facets import (
-    NEAR,
     FacingFacets,
     control_points,
     facet_nodes,
@@ -25,6 +24,7 @@ from contactopt.bounds.facing_facets import (
 from contactopt.bounds.nearest_tractions import Answer
 from contactopt.bounds.simplices import Simplices
 from contactopt.bounds.tetrahedra import Tetrahedra
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved
 from contactopt.solving.solve_scene import Solved
@@ -213,7 +213,7 @@ class PressedScene:
             shape = (pair.contacts.shape[1], nodes.shape[1])
             missing = -pair.jump(out, pair.nodes)[0].reshape(shape)
             missing[pair.nodes.weights.reshape(shape) == 0] = 0.0
-            closed = (pair.of_contacts(self.pressed) > 0).T @ nodes > 1 - NEAR
+            closed = (pair.of_contacts(self.pressed) > 0).T @ nodes > 1 - CLOSE
             least = np.maximum(missing[:, :d], 0.0) @ nodes
             pair.lift(out, np.where(closed, missing, np.maximum(missing, least)))
             more = np.zeros(len(missing))
@@ -222,7 +222,7 @@ class PressedScene:
             bubble = quadratic_shapes(points.at[0])[d:].sum(axis=0)
             if pair.joined:  # on pieces both are quadratic, and no less than their control points
                 gap, bubble = control_points(gap, d), control_points(bubble, d)
-            found = np.divide(-gap, bubble, out=np.zeros(gap.shape), where=bubble > NEAR)
+            found = np.divide(-gap, bubble, out=np.zeros(gap.shape), where=bubble > CLOSE)
             np.maximum.at(more, points.facets[0], found.max(axis=1))
             more[~closed.all(axis=1)] *= CLEAR
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))

@@ -21,11 +21,12 @@ from scipy.linalg import null_space
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
+from contactopt.defaults import EQUAL
+
 QUADRATURE = {1: 4, 2: 6}  # degree of the rule on each part by that of the stress
 OTHERS = ((1, 2), (0, 2), (0, 1))  # vertices of the edge opposite each vertex
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 PAIRS = ((0, 0), (1, 1), (0, 1))  # components of a symmetric matrix
-NONE = 1e-9  # singular values below are zero
 
 
 class SplitTriangle(NamedTuple):
@@ -72,7 +73,9 @@ def split_triangle(k: int, free: int | None = None) -> SplitTriangle:
         t = CORNERS[OTHERS[free][1]] - CORNERS[OTHERS[free][0]]
         along = np.einsum("scn,c->sn", _traction(parts[free].values(forwards), t), t)
         conditions.append(along[:, None])
-    basis = null_space(np.concatenate([own.reshape(-1, own.shape[-1]) for own in conditions]), NONE)
+    basis = null_space(
+        np.concatenate([own.reshape(-1, own.shape[-1]) for own in conditions]), EQUAL
+    )
     x, w = get_quadrature(RefTri, QUADRATURE[k])
     points = np.concatenate([1 - x.sum(axis=0, keepdims=True), x])
     centre = np.full((3, 1), 1 / 3) if k == 1 else np.eye(3)

@@ -46,6 +46,7 @@ import skfem
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
 from contactopt.bounds.facing_facets import FacingFacets, measures
 from contactopt.bounds.tetrahedra import Tetrahedra
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.material import Material
 
@@ -53,7 +54,6 @@ if TYPE_CHECKING:
     from contactopt.bounds.pressed_scene import PressedScene
 
 CONSTANT = 1.73  # c of tetrahedra, from 8 parts of an edge
-SAME = 1e-9  # bends nearer to each other than this share of a facet are one
 UNBALANCED = 1e-6  # of the force on a piece
 
 
@@ -135,7 +135,7 @@ def _by_fans(scene: PressedScene, pair: FacingFacets) -> np.ndarray:
         length = float(np.linalg.norm(b - a))
         ratio = pair.rule.weights[own].sum(axis=1) / (length * np.abs(np.diff(x))[:, 0])
         at = np.unique(np.concatenate([[0.0, 1.0], x.ravel()]))
-        at = at[np.concatenate([[True], np.diff(at) > SAME])]
+        at = at[np.concatenate([[True], np.diff(at) > EQUAL])]
         if len(at) < 3:
             continue
         found = np.zeros((len(at) - 1, 2, 2))  # of pieces that face nothing

@@ -10,10 +10,10 @@ import numpy as np
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.bodies.body import face_of
 from contactopt.checks import place_words
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
 
-OPPOSED = 1e-6  # by how much directions of unit length may differ from opposite ones
 BESIDE = 0.02  # of the extent of a face: how far another one may lie off its axis
 
 
@@ -33,7 +33,7 @@ def check_bolts(scene: Scene, bodies: Sequence[AssembledBody]) -> None:
             extent = max(extent, float(np.ptp(places, axis=(1, 2)).max()))
         one, two = ways
         between = f"the faces '{ends[0][1].boundary}' and '{ends[1][1].boundary}' of bolt '{name}'"
-        if np.linalg.norm(one + two) > OPPOSED:
+        if np.linalg.norm(one + two) > CLOSE:
             words = " and ".join(f"({place_words(way)})" for way in ways)
             remedy = (
                 "name two faces that look away from each other, or give the bolt a direction"
@@ -43,7 +43,7 @@ def check_bolts(scene: Scene, bodies: Sequence[AssembledBody]) -> None:
             raise InputError(f"{between} look along {words}, which are not opposite; {remedy}.")
         apart = centres[1] - centres[0]
         off = float(np.linalg.norm(apart - (apart @ one) * one))
-        if apart @ one > -OPPOSED * extent:
+        if apart @ one > -CLOSE * extent:
             raise InputError(
                 f"{between} look at each other, and pulling them into their bodies would push the"
                 " bodies apart; name the faces under the head and under the nut."

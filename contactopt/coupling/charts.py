@@ -6,19 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from contactopt.coupling.planes_of_symmetry import (
-    NEAR,
-    ContactPoints,
-    SymmetryPlane,
-    symmetry_planes,
-)
+from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
+from contactopt.defaults import CLOSE, EQUAL
 from contactopt.problem.chart import Chart
 
 FLAT = 0.1  # a mean normal shorter than this belongs to a surface that closes on itself
 STEEP = 0.9  # cosine beyond which a direction is too near the normal to make a tangent of it
-EQUAL = 1e-3  # relative difference below which principal moments count as equal
-# places that differ by less than this fraction of the size belong to one row of contacts
-RANK = 1e-6
+ALIKE = 1e-3  # relative difference below which principal moments count as equal
 
 
 def lay_out(
@@ -33,7 +27,7 @@ def lay_out(
     chart and the frames (k, dim, dim) of the contacts in their new order, and this order (k,).
     """
     planes, mirrors = symmetry_planes(contacts), copies > 1
-    if revolved and contacts.points[0].min() <= NEAR * contacts.size:
+    if revolved and contacts.points[0].min() <= EQUAL * contacts.size:
         planes, mirrors = [SymmetryPlane(np.array([1.0, 0.0]), 0.0)], True
     period = None
     if len(contacts.points) == 2:
@@ -111,12 +105,12 @@ def _steps(points: np.ndarray, tangents: np.ndarray, i: np.ndarray, j: np.ndarra
     """From contacts i to contacts j along their mean tangents; the chord on a circle."""
     mean, chord = tangents[:, i] + tangents[:, j], points[:, j] - points[:, i]
     size, along = np.linalg.norm(mean, axis=0), np.sum(mean * chord, axis=0)
-    return np.where(size > NEAR, along / np.maximum(size, NEAR), np.linalg.norm(chord, axis=0))
+    return np.where(size > EQUAL, along / np.maximum(size, EQUAL), np.linalg.norm(chord, axis=0))
 
 
 def _least(gap: np.ndarray, size: float) -> int:
     """Number of the least gap; the first of those that are equal but for rounding."""
-    return int(np.argmax(gap <= gap.min() + NEAR * size))
+    return int(np.argmax(gap <= gap.min() + EQUAL * size))
 
 
 def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndarray, np.ndarray]:
@@ -127,7 +121,7 @@ def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndar
     n = _mean_normal(contacts)
     inward = [plane.inward - (plane.inward @ n) * n for plane in planes]
     inward = [s / np.linalg.norm(s) for s in inward if np.linalg.norm(s) > FLAT]
-    pairs = [(a, b) for a in inward for b in inward if np.cross(n, a) @ b > 1 - NEAR]
+    pairs = [(a, b) for a in inward for b in inward if np.cross(n, a) @ b > 1 - EQUAL]
     if pairs:
         return pairs[0]
     if inward:
@@ -155,7 +149,7 @@ def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
     centred = points - (points @ areas / areas.sum())[:, None]
     centred = centred - np.outer(n, n @ centred)
     moments, vectors = np.linalg.eigh((centred * areas) @ centred.T)
-    if moments[2] - moments[1] > EQUAL * moments[2]:
+    if moments[2] - moments[1] > ALIKE * moments[2]:
         first = vectors[:, 2]
     else:
         first = _rim_direction(contacts)
@@ -163,8 +157,8 @@ def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
         first = first / np.linalg.norm(first)
     along = first @ centred
     sense = float(areas @ along**3) / max(float(areas @ np.abs(along) ** 3), 1e-300)
-    if abs(sense) <= EQUAL:
-        sense = float(along[np.argmax(np.abs(along) > NEAR * contacts.size)])
+    if abs(sense) <= ALIKE:
+        sense = float(along[np.argmax(np.abs(along) > EQUAL * contacts.size)])
     return np.asarray(first if sense >= 0 else -first)
 
 
@@ -176,7 +170,7 @@ def _rim_direction(contacts: ContactPoints) -> np.ndarray:
     rim = known[:, count == 1] if np.any(count == 1) else known
     chords = contacts.points[:, rim[1]] - contacts.points[:, rim[0]]
     length = np.linalg.norm(chords, axis=0)
-    return np.asarray(chords[:, np.argmax(length >= length.max() * (1 - NEAR))])
+    return np.asarray(chords[:, np.argmax(length >= length.max() * (1 - EQUAL))])
 
 
 def _plane(
@@ -188,7 +182,7 @@ def _plane(
     """Coordinates (2, k) along the axes, and which of them are mirrored."""
     places, mirrored = np.stack(axes) @ contacts.points, []
     for axis, row in zip(axes, places):
-        across = [p for p in planes if abs(axis @ p.inward) > 1 - NEAR]
+        across = [p for p in planes if abs(axis @ p.inward) > 1 - EQUAL]
         if across:
             row -= across[0].offset * float(np.sign(axis @ across[0].inward))
         else:
@@ -201,7 +195,7 @@ def _rank(row: np.ndarray, size: float) -> np.ndarray:
     """(k,) the row that each value belongs to; neighbours closer than rounding share one."""
     order = np.argsort(row)
     rank = np.empty(len(row), dtype=int)
-    rank[order] = np.concatenate([[0], np.cumsum(np.diff(row[order]) > RANK * size)])
+    rank[order] = np.concatenate([[0], np.cumsum(np.diff(row[order]) > CLOSE * size)])
     return rank
 
 

@@ -25,12 +25,8 @@ import scipy.sparse as sp
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.checks import place_words
 from contactopt.coupling.patch_test import misfit
-from contactopt.coupling.planes_of_symmetry import (
-    NEAR,
-    ContactPoints,
-    SymmetryPlane,
-    symmetry_planes,
-)
+from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law, Place, make_law
@@ -255,7 +251,7 @@ def guided(
     and friction along e_t acts on what holds the bodies. Otherwise it would be a part of the normal
     force under another name, and neither would be unique.
     """
-    leaning = held.T & (np.abs(frames[:, 0]) > NEAR)
+    leaning = held.T & (np.abs(frames[:, 0]) > EQUAL)
     some = np.flatnonzero(leaning.any(axis=1))
     if not len(some):
         return T
@@ -264,7 +260,7 @@ def guided(
     slips = np.zeros((len(some), dim, dim))
     for j, i in enumerate(some):
         across = frames[i, 1:][:, leaning[i]]
-        inverse = np.linalg.pinv(across, rcond=NEAR)
+        inverse = np.linalg.pinv(across, rcond=EQUAL)
         keep[i, 1:, 1:] -= across @ inverse
         slips[j, 1:, leaning[i]] = inverse
     blocks = sp.bsr_matrix((keep, np.arange(k), np.arange(k + 1)))

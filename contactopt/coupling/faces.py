@@ -17,6 +17,7 @@ import scipy.sparse as sp
 import skfem
 
 from contactopt.bodies.elements import FACES, TIED
+from contactopt.defaults import EQUAL
 
 # kind of the elements -> corners of a face, shape functions of the displacement by degree
 _SHAPES = {
@@ -25,7 +26,6 @@ _SHAPES = {
     "RefTet": (3, {1: skfem.ElementTriP1(), 2: skfem.ElementTriP2()}),
     "RefHex": (4, {1: skfem.ElementQuad1(), 2: skfem.ElementQuad2()}),
 }
-STRAIGHT = 1e-9  # a node on an edge is at its middle within this fraction of the face
 NEWTON, STEPS = 1e-13, 30  # accuracy of a place on a face, in its own coordinates
 
 
@@ -101,7 +101,7 @@ class Faces:
         nodes = self.points[:, self.faces]
         off = nodes[:, :, count:] - nodes[:, :, :count] @ hats
         size = np.ptp(nodes[:, :, :count], axis=2).max(axis=0)
-        return bool(np.any(np.abs(off) > STRAIGHT * size[:, None]))
+        return bool(np.any(np.abs(off) > EQUAL * size[:, None]))
 
     @cached_property
     def distorted(self) -> bool:
@@ -111,7 +111,7 @@ class Faces:
         if self.curved or self.corners < 4:
             return self.curved
         skew = nodes[:, :, 0] - nodes[:, :, 1] + nodes[:, :, 2] - nodes[:, :, 3]
-        return bool(np.any(np.abs(skew) > STRAIGHT * size))
+        return bool(np.any(np.abs(skew) > EQUAL * size))
 
     def shapes(self, at: np.ndarray) -> np.ndarray:
         """(j, m) shape functions of the displacement at reference coordinates (dim - 1, m)."""

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SLACK = 1e-6  # angles that rounding may add, far more than it does
+from contactopt.defaults import CLOSE
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +81,9 @@ def _seen(own: Facets, other: Facets, facing: float) -> np.ndarray:
     distance = np.linalg.norm(v, axis=0)
     off = np.arctan2(np.linalg.norm(v - along * own.axis, axis=0), np.abs(along))
     spread = np.arcsin(np.minimum(reach / np.maximum(distance, 1e-300), 1.0))
-    met = (distance <= reach) | (off <= own.angle + spread + SLACK)
+    met = (distance <= reach) | (off <= own.angle + spread + CLOSE)
     turned = np.arccos(np.clip(-np.sum(own.axis * other.axis, axis=0), -1.0, 1.0))
-    return np.asarray(met & (turned <= own.angle + other.angle + np.arccos(-facing) + SLACK))
+    return np.asarray(met & (turned <= own.angle + other.angle + np.arccos(-facing) + CLOSE))
 
 
 def _tree(facets: Facets) -> tuple[list[Facets], np.ndarray]:

@@ -15,12 +15,12 @@ from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, guided, local_map, of_contacts
 from contactopt.coupling.planes_of_symmetry import ContactPoints, normals_in_planes
 from contactopt.coupling.segments import FACING
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
 
-MATCH = 1e-6  # nodes match within this fraction of the shortest distance between contact nodes
 # and, where normals of a curved surface are known to its turn only, never beyond this fraction
 LOOSEST = 0.25
 NEAREST = 8  # nodes among which the nearest one that faces a node is looked for
@@ -200,7 +200,7 @@ def _along(
     def measured(some: np.ndarray | slice) -> tuple[np.ndarray, np.ndarray]:
         apart = upper.points[:, found[some]] - lower.points[:, some]
         height = np.sum(apart * direction[:, some], axis=0)
-        allowed = np.minimum(MATCH + slack[some] * np.abs(height) / spacing, LOOSEST) * spacing
+        allowed = np.minimum(CLOSE + slack[some] * np.abs(height) / spacing, LOOSEST) * spacing
         return np.linalg.norm(apart - height * direction[:, some], axis=0), allowed
 
     off, allowed = measured(slice(None))
@@ -227,4 +227,4 @@ def _best(upper: Surface, lower: Surface, near: np.ndarray, spacing: float) -> n
     row = np.arange(len(near))
     first = np.argmax(cosine < 0, axis=1)
     apart = np.linalg.norm(upper.points[:, near] - upper.points[:, near[row, first], None], axis=0)
-    return np.asarray(np.argmin(np.where(apart <= MATCH * spacing, cosine, np.inf), axis=1))
+    return np.asarray(np.argmin(np.where(apart <= CLOSE * spacing, cosine, np.inf), axis=1))

@@ -82,10 +82,10 @@ from contactopt.coupling.faces import NEWTON, Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
 from contactopt.coupling.mortar_matrices import collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 
 NUDGE = 0.05  # of the way to the centre of a face: about the first point of integration on it
-OVERLAP = 1e-9  # initial overlap, over the extent of the contact surface, that is reported
 
 _log = logging.getLogger(__name__)
 
@@ -185,7 +185,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     x = mine.points[:, nodes]
     fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, nodes]
     x = np.where(fixed, x, (sums.own @ mine.points.T).T)
-    if sums.least < -OVERLAP * np.ptp(x, axis=1).max():
+    if sums.least < -EQUAL * np.ptp(x, axis=1).max():
         where = place_words(sums.nearest)
         said = "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)"
         _log.warning(said, upper.name, lower.name, -sums.least, where)

@@ -14,7 +14,8 @@ from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, guided, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import Mortar, contact_normals, mortar
-from contactopt.coupling.planes_of_symmetry import NEAR, ContactPoints, symmetry_planes
+from contactopt.coupling.planes_of_symmetry import ContactPoints, symmetry_planes
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.curves import KINK
 from contactopt.scenes.contact import SIDES, Contact
@@ -57,7 +58,7 @@ def couple_surfaces(
     # as well where a plane of symmetry of both cuts it. A contact that moved to where the other
     # surface ends is no more at its node, which a support may hold.
     moved = np.linalg.norm(m.points - carrier.points[:, m.nodes], axis=0)
-    own_held = mine.held[:, m.nodes] & (moved <= NEAR * np.ptp(m.points, axis=1).max())
+    own_held = mine.held[:, m.nodes] & (moved <= EQUAL * np.ptp(m.points, axis=1).max())
     if carrier.mirror is not None:
         own_held |= mine.held[:, m.nodes] & carrier.mirror[:, m.nodes]
     other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
@@ -189,7 +190,7 @@ def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
         plane
         for plane in planes[0]
         for other in planes[1]
-        if np.all(plane.inward == other.inward) and abs(plane.offset - other.offset) <= NEAR * size
+        if np.all(plane.inward == other.inward) and abs(plane.offset - other.offset) <= EQUAL * size
     ]
     if not common:
         return sides

@@ -6,7 +6,7 @@ the body's own surface, int N_j n. Its own contacts give these: the sum of a_i n
 traces. What counts is the component along the normal of the surface. The comparison costs about one
 product with each sparse map.
 
-**What is allowed.** On flat surfaces the test holds to rounding (EXACT). On curved ones the two
+**What is allowed.** On flat surfaces the test holds to rounding (EQUAL). On curved ones the two
 sides see one contact on faces of slightly different size and direction. Let c be the cosine of the
 angle between the normal of a contact and those of the nodes that it acts on, or between these and
 the faces around them. An area, and a component along a normal, then differ by 1 - c each, on both
@@ -34,12 +34,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import Mesh, Surface
+from contactopt.defaults import EQUAL
 from contactopt.scenes.contact import SIDES
 
 if TYPE_CHECKING:
     from contactopt.coupling.coupling import Coupling
 
-EXACT = 1e-9  # relative error of a nodal force that rounding may make
 CORNERS = {"RefTri": 2, "RefQuad": 2, "RefTet": 3, "RefHex": 4}  # of a face of these elements
 GAP = 3.0  # what a gap makes of an area, over gap and curvature: 2 on a sphere, and its square
 CHORD = 4.0  # two areas and two components along normals, over 1 - c
@@ -69,7 +69,7 @@ def misfit(made: Coupling, surfaces: Sequence[Surface | None]) -> Misfit | None:
         for number, surface in enumerate(surfaces)
         if surface is not None and surface.mesh is not None
     ]
-    allowed = np.full(len(made.gap), EXACT)
+    allowed = np.full(len(made.gap), EQUAL)
     if made.conforming or made.share is not None:
         allowed += _chords(made, sides)
     found = []
@@ -122,7 +122,7 @@ class _Side:
         rigid = np.linalg.norm([W.sum(axis=1) for W in along], axis=0).ravel()  # 1 where right
         moved = sum(W @ n for W, n in zip(along, self.normals))
         self.cosine = sign * moved / np.maximum(rigid, 1e-300)
-        self.held = np.any(mesh.held & (np.abs(self.normals) > EXACT), axis=0)
+        self.held = np.any(mesh.held & (np.abs(self.normals) > EQUAL), axis=0)
 
     def turn(self) -> np.ndarray:
         """(k,) largest 1 - cosine at a contact: of its normal, and of the faces at its nodes."""
@@ -159,10 +159,10 @@ def _compared(made: Coupling, side: _Side, other: _Side) -> np.ndarray:
     if made.share is None:
         return side.seen  # contacts are nodes of both sides
     rim, beside = other.acts @ other.ends() > 0, side.beside()
-    if np.abs(made.areas.sum() / side.surface.areas.sum() - 1) < EXACT:  # all is covered
+    if np.abs(made.areas.sum() / side.surface.areas.sum() - 1) < EQUAL:  # all is covered
         rim[:], beside[:] = False, False
     elif side.number == SIDES.index(made.carrier):
-        rim &= np.abs(made.share - 1) > EXACT
+        rim &= np.abs(made.share - 1) > EQUAL
     for one in (side, other):  # where supports take the forces
         rim |= one.acts @ one.held > 0
     return np.asarray(side.seen & ~beside & (side.acts.T @ rim == 0))

@@ -9,10 +9,9 @@ import numpy as np
 
 from contactopt.bodies.assembled import Guides
 from contactopt.bodies.corners import smooth_tilts
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.scenes.scene import Scene
-
-NEAR = 1e-9  # what counts as zero beside the size of a surface or of all bodies, or beside one
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +49,7 @@ class SymmetryPlane:
 
     def contains(self, points: np.ndarray, size: float) -> np.ndarray:
         """Which of the points (dim, k), on a surface of that size [length], lie in the plane."""
-        return np.asarray(np.abs(self.inward @ points - self.offset) <= NEAR * size)
+        return np.asarray(np.abs(self.inward @ points - self.offset) <= EQUAL * size)
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
@@ -63,11 +62,11 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
         if not mask.any():
             continue
         offset = float(points[c, mask].mean())
-        plane = np.abs(points[c] - offset) <= NEAR * contacts.size
+        plane = np.abs(points[c] - offset) <= EQUAL * contacts.size
         side = np.sign(points[c, ~plane] - offset)
         tangential = np.all(np.abs(normals[c, plane]) <= tilts[plane])
         # along the normal, at least
-        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > NEAR), axis=0)
+        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > EQUAL), axis=0)
         if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):
             planes.append(SymmetryPlane(side[0] * np.eye(len(points))[c], offset * side[0]))
     return planes
@@ -79,8 +78,8 @@ def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
     for plane in symmetry_planes(contacts):
         out = plane.inward @ normals
         straight = normals - plane.inward[:, None] * out
-        straight = straight / np.linalg.norm(straight, axis=0).clip(NEAR)
-        tilted = plane.contains(contacts.points, contacts.size) & (np.abs(out) > NEAR)
+        straight = straight / np.linalg.norm(straight, axis=0).clip(EQUAL)
+        tilted = plane.contains(contacts.points, contacts.size) & (np.abs(out) > EQUAL)
         normals = np.where(tilted, straight, normals)
     return normals
 
@@ -119,7 +118,7 @@ def mirror_planes(
 def _guiding(guides: Sequence[Guides], dim: int) -> dict[int, SymmetryPlane]:
     """For each axis the first plane across it that guides a body and has all bodies on one side."""
     extent = np.concatenate([own.extent for own in guides], axis=1)
-    near = NEAR * float(np.ptp(extent, axis=1).max(initial=0.0))
+    near = EQUAL * float(np.ptp(extent, axis=1).max(initial=0.0))
     planes = {}
     known = {plane for own in guides for plane in own.planes}
     for axis, place, side in sorted(known, reverse=True):

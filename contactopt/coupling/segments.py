@@ -29,12 +29,12 @@ from contactopt.bodies.elements import weight_at
 from contactopt.checks import place_words
 from contactopt.coupling.faces import Faces, cross, face_normals, patches
 from contactopt.coupling.facing import Facets, facing_pairs
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import area_vectors
 
 # cells that are covered by less than this fraction count as uncovered: the noise of coordinates
 SMALLEST = 1e-8
-WHOLE = 1e-9  # and those that are covered but for less than this count as covered
 FACING = -0.1  # the cosine between normals of faces that face each other is below this
 FOLD = 1.05  # a cell that is covered by more than this faces two layers of the other surface
 # degrees added to the quadrature where a face is distorted, so that integrands are no polynomials:
@@ -258,7 +258,7 @@ def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndar
         far = np.zeros(len(covered))
         np.maximum.at(far, cell, corners.sum(axis=0).max(axis=1))
         high = low + far - low.sum(axis=0)
-    partial = (covered > SMALLEST) & (covered < 1 - WHOLE)
+    partial = (covered > SMALLEST) & (covered < 1 - EQUAL)
     low, high = (
         np.where(partial, low.clip(0.0, 1.0), 0.0),
         np.where(partial, high.clip(0.0, 1.0), 1.0),
@@ -289,7 +289,7 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     normal = mine.normal[:, first]
     keep, covered = _nearest(other, mine, theirs, (first, second), part, middle, normal)
     # the corners of pieces on cells that are covered in part only, in the coordinates of the cells
-    part_of = np.flatnonzero(keep & (covered[mine.cell[first]] < 1 - WHOLE))
+    part_of = np.flatnonzero(keep & (covered[mine.cell[first]] < 1 - EQUAL))
     cut = np.repeat(first[part_of], polygon.shape[1])
     x = _in_space(mine, axes, cut, polygon[part_of].reshape(-1, 2))
     here = own.locate(mine.face[cut], x, axes[cut], mine.middle[:, cut])

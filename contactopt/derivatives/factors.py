@@ -25,6 +25,7 @@ from scipy.linalg.blas import dtrsm
 from scipy.linalg.lapack import dgecon, dgetrf, dgetrs, dlange, dlaswp, dpotrf
 from scipy.sparse.linalg import splu
 
+from contactopt.defaults import ROUNDED
 from contactopt.derivatives.constants import WHOLE
 from contactopt.errors import InputError
 from contactopt.linear.operators import asymmetry
@@ -33,7 +34,6 @@ from contactopt.methods.kernels.bonded import LEAST_PIVOT
 SINGULAR = 1e-13  # reciprocal condition of a matrix below which it counts as singular
 DOUBT = 1e-6  # least pivot, over the largest, below which the condition is looked at
 UNSEEN = 1e-8  # relative residual up to which a singular system counts as solved
-SYMMETRIC = 1e-12  # |Q - Q'| / |Q| up to which Q counts as symmetric
 UNIQUE = (
     "the solution has no derivative, because its linear system is singular: forces or motions are"
     " not unique there; remove redundant contacts, or hold the bodies."
@@ -235,7 +235,7 @@ def _sticking(Q: np.ndarray, kept: np.ndarray, stick: np.ndarray) -> tuple[np.nd
     if np.count_nonzero(kept) <= WHOLE or not stick.any():
         return none
     own = Q if stick.all() else Q[stick].take(stick.nonzero()[0], axis=1)
-    if asymmetry(own) > SYMMETRIC:
+    if asymmetry(own) > ROUNDED:
         return none
     G, failed = dpotrf(own.T, lower=True, clean=False, overwrite_a=own is not Q)
     pivots = G.diagonal()

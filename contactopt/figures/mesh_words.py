@@ -11,10 +11,10 @@ import numpy as np
 from skfem import Mesh
 
 from contactopt.bodies.elements import Faces
+from contactopt.defaults import EQUAL
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
 UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
-ZERO = 1e-9  # of the largest coordinate: what rounding leaves of zero
 DEGREE = 4  # of the quadrature of volumes and areas
 SHAPE = 0.02  # by how much a boundary may be off a plane or a circle [of 1, of its radius]
 
@@ -47,7 +47,7 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
 
 def _place(mesh: Mesh, x: np.ndarray) -> str:
     """Coordinates in brackets."""
-    shown = np.where(np.abs(x) < ZERO * np.abs(mesh.p).max(), 0.0, x)
+    shown = np.where(np.abs(x) < EQUAL * np.abs(mesh.p).max(), 0.0, x)
     return "(" + ", ".join(f"{value:.5g}" for value in shown) + ")"
 
 

@@ -42,7 +42,6 @@ UNDRAWN = (
     "no figure and no page was made: the last iterate moves a body by more than a thousand times"
     " its size."
 )
-STATUS = ("open", "stick", "slip")
 # of the bodies at all states of a load path, above which only the last state is written
 MOST_NUMBERS = 3_000_000
 # What a run writes beside summary.json and one VTU file per body.
@@ -141,8 +140,7 @@ def write_tables(result: Outcome, surfaces: Sequence[ContactFields], folder: Pat
                 head, values = found[number].rows(scene.components, scene.units)
                 if file.tell() == 0:
                     rows.writerow(["state", *head])
-                words = np.array(STATUS)[values[:, -1].astype(int)]
-                rows.writerows([step, *own[:-1], word] for own, word in zip(values.tolist(), words))
+                rows.writerows([step, *own] for own in values)
 
 
 def write_series(path: PathResult, last: tuple[Fields, ...], folder: Path) -> None:

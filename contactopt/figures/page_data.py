@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 from skfem import Mesh
 
 from contactopt.cards import force_unit
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.figures.closing import closing, gap_vectors
 from contactopt.figures.html import packed, packed_short
 from contactopt.figures.output import SERIES, SINGLE
@@ -34,8 +35,6 @@ NEAREST = 16  # how many times as large as the picture of a contact the bodies m
 TURNS = 0.5  # length of the mean of unit normals below which a surface goes around something
 # cosine of the angle between two faces from which on their edge is drawn
 SHARP = np.cos(np.deg2rad(30))
-ROUNDING = 1e-12  # of a surface, below which a gap or a slip is what rounding leaves of zero
-ON_PLANE = 1e-9  # of the size of a body, within which a node lies in a plane of symmetry
 # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut: such
 # a page has at most 4 MB
 MOST_INSIDE = 25_000
@@ -221,7 +220,7 @@ def _apart(
     size = float(np.ptp(points, axis=0).max())
     within = np.zeros(len(items), dtype=bool)
     for axis, place in mirrors:
-        within |= np.all(np.abs(points[items, axis] - place) <= ON_PLANE * size, axis=1)
+        within |= np.all(np.abs(points[items, axis] - place) <= EQUAL * size, axis=1)
     return items[~within], items[within]
 
 
@@ -279,7 +278,7 @@ def _contact(
 
 def _rounded(lengths: np.ndarray, extent: float) -> np.ndarray:
     """Lengths without what rounding leaves of zero."""
-    return np.where(np.abs(np.nan_to_num(lengths)) > ROUNDING * extent, lengths, 0.0)
+    return np.where(np.abs(np.nan_to_num(lengths)) > ROUNDED * extent, lengths, 0.0)
 
 
 def _last_state(mesh: Mesh, interface: dict[str, np.ndarray], own: slice) -> dict[str, np.ndarray]:

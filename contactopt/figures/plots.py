@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import CLOSE
 from contactopt.figures.bodies import deformed
 from contactopt.figures.path_plots import energies, loop, path_figure
 from contactopt.figures.pieces import triangles
@@ -45,7 +46,6 @@ __all__ = [
     "loop", "maps_figure", "path_figure", "pressure", "refinement_figure",
     "stick_map", "traction",
 ]  # fmt: skip
-STRAIGHT = 1e-6  # a contact line that leaves its chord by less than this fraction of its length
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
 SMALL = 6.0  # parts of a contact line of which the contact zone fills one, if it is drawn alone
@@ -87,7 +87,7 @@ def _place_names(scene: Scene, problem: InterfaceProblem) -> tuple[str, str]:
 def _straight(problem: InterfaceProblem) -> bool:
     """Whether the contact line follows the first coordinate; true of every surface in 3D."""
     extent = np.ptp(problem.coordinates, axis=1)
-    return problem.dim == 3 or len(extent) < 2 or bool(extent[1] <= STRAIGHT * extent[0])
+    return problem.dim == 3 or len(extent) < 2 or bool(extent[1] <= CLOSE * extent[0])
 
 
 def _singular(scene: Scene) -> bool:
@@ -216,7 +216,7 @@ def _map(scene: Scene, problem: InterfaceProblem, values: np.ndarray, label: str
 def _plane(scene: Scene, problem: InterfaceProblem, ax: Axes) -> None:
     """Name the axes of a surface in 3D, which are x and y where it lies across z."""
     places, unit = problem.chart.places, scene.units[0]
-    flat = np.allclose(places, problem.coordinates[:2], atol=STRAIGHT * np.ptp(places))
+    flat = np.allclose(places, problem.coordinates[:2], atol=CLOSE * np.ptp(places))
     first, second = ("$x$", "$y$") if flat else ("$s$ on the surface", "$t$ on the surface")
     ax.set(xlabel=f"{first} [{unit}]", ylabel=f"{second} [{unit}]", aspect="equal")
 

@@ -23,6 +23,7 @@ from contactopt.coupling.compliance import filling
 from contactopt.coupling.costs import FORM_OF, estimates
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.posed import Posed, posed, problem_of
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
 from contactopt.problem import InterfaceProblem
@@ -36,7 +37,6 @@ from contactopt.solving.solve_scene import STEPS
 if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
 
-CLOSED = 1e-9  # of the size of a surface, within which a gap is what rounding leaves of zero
 FLAT = 0.01  # degrees by which normals may differ and still be one direction
 WORDS = {
     "dense": "Q as an array",
@@ -210,7 +210,7 @@ def _pair_lines(scene: Scene, pair: Contact, own: Coupling) -> list[str]:
     apart = float(np.degrees(np.arccos(np.clip(normals @ mean, -1.0, 1.0))).max(initial=0.0))
     varied = "" if apart < FLAT else f", which they leave by up to {apart:.3g} degrees"
     lines.append(f"  normals from '{pair.lower}' to '{pair.upper}': {_direction(mean)}{varied}")
-    touch = np.abs(own.gap) <= CLOSED * size
+    touch = np.abs(own.gap) <= EQUAL * size
     gap = np.where(touch, 0.0, own.gap)
     overlap = gap < 0
     words = [f"initial gap {gap.min():.4g} to {gap.max():.4g} {length}"]

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import Damaged, InputError
+from contactopt.meshes.inp_elements import CORNERS
 
 # card -> shape by its number of nodes
 _SHAPES = (
@@ -36,7 +37,6 @@ _SHAPES = (
 )
 ELEMENTS = {card: shapes for cards, shapes in _SHAPES for card in cards.split()}
 SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM")  # whose cards end with their nodes
-CORNERS = {"wedge": 6, "pyramid": 5}
 # the first node of a card: PLOTEL has no property
 FIRST = {"PLOTEL": 2}
 POINTS = re.compile(

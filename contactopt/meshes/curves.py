@@ -27,6 +27,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from skfem import Mesh
 
+from contactopt.defaults import EQUAL
 from contactopt.meshes.cells import is_curved
 from contactopt.meshes.given_curves import Curve
 
@@ -37,9 +38,6 @@ LARGEST = np.deg2rad(75)
 ALIKE = 1e-3  # relative difference of their curvatures, and of angles [rad]
 # a smaller turn is a corner if it is more than this, and times what its neighbours suggest
 KINK = np.deg2rad(5), 5.0
-# the middle of an edge is off the chord by more than this fraction of it, or the edge is straight
-STRAIGHT = 1e-9
-EXACT = 1e-9  # of the size of the body: coordinates are not compared more exactly
 DIGITS = range(6, 13)  # decimal digits that files write
 STEEP = np.sin(np.deg2rad(60))  # largest sine of the angle between an edge and its curve
 
@@ -80,7 +78,7 @@ def _edges(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
         return ends, mesh.p, facets, False
     middle, points = mesh.dofs.facet_dofs[0, facets], mesh.doflocs
     off = np.linalg.norm(points[:, middle] - points[:, ends].mean(axis=1), axis=0)
-    if not np.any(off > STRAIGHT * np.linalg.norm(points[:, ends[1]] - points[:, ends[0]], axis=0)):
+    if not np.any(off > EQUAL * np.linalg.norm(points[:, ends[1]] - points[:, ends[0]], axis=0)):
         return ends, points, facets, False
     halves = np.concatenate([[ends[0], middle], [middle, ends[1]]], axis=1)
     return halves, points, np.tile(facets, 2), True
@@ -89,7 +87,7 @@ def _edges(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
 def rounding(points: np.ndarray) -> float:
     """Find how far nodes (dim, m) may be off because a file rounds its numbers [length]."""
     size, largest = np.ptp(points, axis=1).max(), np.abs(points).max()
-    least = max(EXACT * size, 16 * np.finfo(float).eps * largest)
+    least = max(EQUAL * size, 16 * np.finfo(float).eps * largest)
     if np.array_equal(points, points.astype(np.float32)):
         return float(max(least, 2.0**-22 * largest))
     sample = points.ravel()[:: max(1, points.size // 200)]
@@ -322,7 +320,7 @@ class _Blends:
         half the longest one.
         """
         some = self.tree.query(points.T)[1]
-        reach = self._foot(points, some)[1] + self.length.max() * (1 + EXACT) / 2
+        reach = self._foot(points, some)[1] + self.length.max() * (1 + EQUAL) / 2
         found = self.tree.query_ball_point(points.T, reach)
         edge = np.concatenate(found).astype(int)
         of = np.repeat(np.arange(len(found)), [len(each) for each in found])

@@ -27,8 +27,9 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 from skfem import Mesh
 
+from contactopt.defaults import EQUAL
 from contactopt.meshes.cells import area_vectors, is_curved, joined, outer_corners
-from contactopt.meshes.curves import CORNER, STRAIGHT, fitted_sphere, rounding, shares
+from contactopt.meshes.curves import CORNER, fitted_sphere, rounding, shares
 from contactopt.meshes.given_curves import Curve
 
 EDGE = np.deg2rad(60)  # turn of facets of second order from which on there is an edge of the body
@@ -77,7 +78,7 @@ class _Skin:
         self.middles = middles
         self.off = middles - _between(self.corners)
         length = np.linalg.norm(_along(self.corners), axis=0)
-        self.known = bool(np.any(np.linalg.norm(self.off, axis=0) > STRAIGHT * length))
+        self.known = bool(np.any(np.linalg.norm(self.off, axis=0) > EQUAL * length))
         self.near = rounding(self.corners.reshape(3, -1))
         area = area_vectors(self.corners)
         self.normals = area / np.linalg.norm(area, axis=0)

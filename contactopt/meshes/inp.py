@@ -24,6 +24,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from contactopt.checks import place_words
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
 from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of
@@ -31,7 +32,6 @@ from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Later, Named, b
 from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
-SAME = 1e-9  # of the coordinates, within which places are those of one node
 
 
 def read_inp(path: Path) -> Any:
@@ -254,7 +254,7 @@ class Scope:
 
     def put(self, block: Block, tags: list[int], places: np.ndarray, name: str) -> None:
         """Add nodes, to a set if it has a name. The last place counts."""
-        size = SAME * np.abs(places).max(initial=0.0)
+        size = EQUAL * np.abs(places).max(initial=0.0)
         for tag, place in zip(tags, map(tuple, places.tolist())):
             before = self.nodes.setdefault(tag, place)
             if before != place and max(abs(a - b) for a, b in zip(before, place)) > size:

@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.inp_text import Block, Later, Row, bare, set_of
 
 if TYPE_CHECKING:
     from contactopt.meshes.inp import Scope
-
-STRAIGHT = 1e-9  # sine of the angle below which two directions span no plane
 
 
 def motion(block: Block, rows: list[Row]) -> Callable[[np.ndarray], np.ndarray]:
@@ -133,11 +132,11 @@ def _arc(
     across = np.cross(a - centre, b - centre)
     if not any(normal):
         normal = across
-    if not min(sizes) or np.linalg.norm(normal) < STRAIGHT * sizes[0] * sizes[1]:
+    if not min(sizes) or np.linalg.norm(normal) < EQUAL * sizes[0] * sizes[1]:
         raise block.fail("the ends and the centre of the arc lie on one line", line)
     normal = normal / np.linalg.norm(normal)
     angle = np.arctan2(across @ normal, (a - centre) @ (b - centre)) % (2 * np.pi)
-    angle = 2 * np.pi if angle < STRAIGHT else angle
+    angle = 2 * np.pi if angle < EQUAL else angle
     turned = Rotation.from_rotvec(t * angle * normal).apply(a - centre)
     return np.asarray(centre + turned * (1 + t * (sizes[1] / sizes[0] - 1)))
 

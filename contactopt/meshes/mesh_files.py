@@ -17,12 +17,12 @@ import skfem
 
 from contactopt.cards import count
 from contactopt.checks import check_number, overheard, place_words, remember
+from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.inp_elements import FACES
 from contactopt.meshes.mesh_formats import FileGroups, read_groups
 from contactopt.meshes.mesh_repair import (
     CORNERS,
-    SAME,
     Cells,
     check_connected,
     check_elements,
@@ -31,7 +31,6 @@ from contactopt.meshes.mesh_repair import (
     representatives,
 )
 
-PLANE = 1e-9  # a mesh is plane if it is thinner than this fraction of its size
 FAR = 1e100  # larger coordinates have no volume in floating-point numbers
 log = logging.getLogger(__name__)
 
@@ -136,7 +135,7 @@ def name_boundaries(
     """
     facets = mesh.boundary_facets()
     corners = mesh.p[:, mesh.facets[:, facets]]
-    near = SAME * np.ptp(mesh.p, axis=1).max()
+    near = CLOSE * np.ptp(mesh.p, axis=1).max()
     found = {}
     for name, limits in places.items():
         inside = np.ones(len(facets), dtype=bool)
@@ -171,11 +170,11 @@ def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
     if dim == points.shape[1]:
         return dim, points.T
     spread = np.ptp(points[cells], axis=0)
-    if spread.min() > PLANE * spread.max():
+    if spread.min() > EQUAL * spread.max():
         raise InputError(
             f"mesh file '{path}': it holds a surface in space only; mesh the volume inside it, too."
         )
-    across = 2 if spread[2] <= PLANE * spread.max() else int(np.argmin(spread))
+    across = 2 if spread[2] <= EQUAL * spread.max() else int(np.argmin(spread))
     if across != 2:
         said = "%s: the mesh lies across the %s axis; the other coordinates keep their order"
         log.info(said, path, "xyz"[across])
@@ -302,7 +301,7 @@ def _tell_others(path: Path, groups: FileGroups) -> None:
         return
     size = np.ptp(groups.points, axis=0).max() or 1.0
     with np.errstate(invalid="ignore"):  # nodes of no element may have no place
-        steps = np.round(groups.points / (SAME * size))
+        steps = np.round(groups.points / (CLOSE * size))
     places = np.unique(steps, axis=0, return_inverse=True)[1]
     numbers = np.random.default_rng(0).integers(0, 2**63, len(groups.points), dtype=np.uint64)
     key = numbers[places.ravel()]

@@ -12,6 +12,7 @@ import skfem
 from scipy.spatial import KDTree
 
 from contactopt.checks import place_words
+from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import Damaged, InputError
 from contactopt.meshes.cells import (
     area_vectors,
@@ -22,11 +23,9 @@ from contactopt.meshes.cells import (
     volumes,
 )
 
-SAME = 1e-6  # places this fraction of a size apart are one place
 # nodes are one, or two, if they are less, or more, than this fraction of the shortest edge apart
 ONE, APART = 1e-4, 1e-3
 FLAT = 1e-10  # an element of less volume, over that of a cube of its size, is degenerate
-CLOSED = 1e-9  # what the normals of a closed surface may sum up to, over its area
 CORNERS = {  # of the elements that can be used
     **{"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "tetra": 4, "tetra10": 4},
     **{"hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8},
@@ -213,7 +212,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     curved = len(cells.nodes) > len(cells.corners)
     nodes = mesh.doflocs[:, mesh.dofs.element_dofs] if curved else mesh.p[:, mesh.t]
     apart = np.abs(nodes.sum(axis=1) - cells.points[:, cells.nodes].sum(axis=1)).max(axis=0)
-    wrong = np.flatnonzero(apart > SAME * np.ptp(nodes, axis=1).max(axis=0))
+    wrong = np.flatnonzero(apart > CLOSE * np.ptp(nodes, axis=1).max(axis=0))
     if len(wrong):
         raise cells.refused(
             wrong[0],
@@ -238,7 +237,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     # the outward normals of a closed surface integrate to zero
     areas = area_vectors(mesh.p[:, outer_corners(mesh, mesh.boundary_facets())])
     total = np.abs(areas.sum(axis=1)).max()
-    if total > CLOSED * np.linalg.norm(areas, axis=0).sum():
+    if total > EQUAL * np.linalg.norm(areas, axis=0).sum():
         raise InputError(
             f"mesh file '{cells.path}': the surface of the body is not closed, its normals sum up"
             f" to {total:.3g}; elements overlap."

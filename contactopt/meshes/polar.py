@@ -7,10 +7,9 @@ from __future__ import annotations
 import numpy as np
 from skfem import MeshQuad, MeshQuad2
 
+from contactopt.defaults import EQUAL
 from contactopt.meshes.discs import half_disc
 from contactopt.meshes.structured import tensor_mesh
-
-NEAR = 1e-9  # what counts as zero beside the size of the body
 
 
 def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
@@ -24,7 +23,7 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
     angle, radius = flat.p
     points = radius * np.stack([np.cos(angle), np.sin(angle)])
     names = {"inner": "y-", "outer": "y+", "start": "x-", "end": "x+"}
-    if angles[-1] - angles[0] < 2 * np.pi * (1 - NEAR):
+    if angles[-1] - angles[0] < 2 * np.pi * (1 - EQUAL):
         made = _quads(points, flat.t)
         old = flat.boundaries
         return _on_circles(made.with_boundaries({new: old[name] for new, name in names.items()}))
@@ -45,14 +44,14 @@ def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     made = _quads(np.stack([y, -x]), t)
     facets = made.boundary_facets()
-    axis = np.all(np.abs(made.p[0, made.facets[:, facets]]) < NEAR * radius, axis=0)
+    axis = np.all(np.abs(made.p[0, made.facets[:, facets]]) < EQUAL * radius, axis=0)
     return _on_circles(made.with_boundaries({"rim": facets[~axis], "axis": facets[axis]}), radius)
 
 
 def disc(radius: float, sectors: int) -> MeshQuad2:
     """The whole disc with the boundary 'rim', whose nodes divide it into 8 * sectors even parts."""
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
-    diameter = np.flatnonzero(np.abs(y) < NEAR * radius)
+    diameter = np.flatnonzero(np.abs(y) < EQUAL * radius)
     along = diameter[np.argsort(x[diameter])]
     # the node that each becomes when the half disc is turned by half a turn
     other = np.full(len(x), -1)
@@ -74,9 +73,9 @@ def _on_circles(mesh: MeshQuad, only: float | None = None) -> MeshQuad2:
     made = MeshQuad2.from_mesh(mesh)
     ends = mesh.p[:, mesh.facets]
     first, second = np.linalg.norm(ends, axis=0)
-    bent = np.flatnonzero(np.abs(first - second) <= NEAR * second.max())
+    bent = np.flatnonzero(np.abs(first - second) <= EQUAL * second.max())
     if only is not None:
-        bent = bent[np.abs(first[bent] - only) <= NEAR * only]
+        bent = bent[np.abs(first[bent] - only) <= EQUAL * only]
     points = made.doflocs.copy()
     size = np.linalg.norm(ends[:, :, bent].mean(axis=1), axis=0)
     stretch = np.ones(points.shape[1])

@@ -20,6 +20,7 @@ import numpy as np
 import scipy.linalg as la
 
 from contactopt.cards import card, count, line
+from contactopt.defaults import EQUAL, TOL
 from contactopt.errors import InputError
 from contactopt.linear.operators import NOISE
 from contactopt.methods.cone import Relaxation
@@ -44,10 +45,8 @@ from contactopt.problem import (
 )
 from contactopt.problem.cones import coulomb_cone
 
-# a residual of at most the one is a solution, above the other it is none
-CERTIFIED, DISTINCT = 1e-8, 1e-6
+DISTINCT = 1e-6  # a residual above this is none of a solution; up to TOL it is
 LOOSE = 1e12  # condition above which rounding decides
-SYMMETRIC = 1e-9  # asymmetry below which Q counts as symmetric
 
 
 def _trust(at: Local) -> str:
@@ -146,7 +145,7 @@ class Diagnosis:
         if np.isnan(at.singular):
             return f"{said}; the linear system of these states is singular"
         about = "about " if self.dim == 3 and at.slip else ""
-        if self.asymmetry <= SYMMETRIC:
+        if self.asymmetry <= EQUAL:
             said += (
                 f"; rate of alternating {at.alternating_rate:.3g}, Tresca {at.tresca_rate:.3g} (1"
                 f" at mu = {about}{at.contraction:.3g})"
@@ -197,7 +196,7 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
     counted = values[values > len(values) * np.finfo(float).eps * values.max(initial=0.0)]
     eigenvalues = la.eigvalsh((problem.Q + problem.Q.T) / 2)
     skew = float(np.linalg.norm(problem.Q - problem.Q.T) / (np.linalg.norm(problem.Q) or 1.0))
-    energy = skew <= SYMMETRIC
+    energy = skew <= EQUAL
     unloaded = dimensionless(problem.altered(q=0.0 * problem.q))[0]  # for every load
     guaranteed, uniform, exact = thresholds(unloaded, shape, energy)
     return Diagnosis(
@@ -243,10 +242,10 @@ def _at(
 def _relaxation(problem: InterfaceProblem) -> str:
     if not Relaxation().solves(problem.law):
         return "none"
-    answer = solve(problem, Relaxation(), tol=CERTIFIED)
+    answer = solve(problem, Relaxation(), tol=TOL)
     r, u = answer.reactions, problem.displacements(answer.reactions, answer.multipliers)
     error = float(np.linalg.norm(r - coulomb_cone(r - u, problem.mu)))
-    optimal = error <= CERTIFIED * np.linalg.norm(r) and balance_residual(problem, r) <= CERTIFIED
+    optimal = error <= TOL * np.linalg.norm(r) and balance_residual(problem, r) <= TOL
     if answer.solved:  # perhaps by the point before the program, which has no minimiser
         return "tight" if error <= DISTINCT * max(1.0, float(np.linalg.norm(r))) else "undecided"
     Z = la.null_space(problem.V.T) if len(problem.s) else np.eye(len(problem.Q))

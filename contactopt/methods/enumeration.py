@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from contactopt.checks import check_number
+from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.methods.kernels.states import StateTree, can, sides_of
 from contactopt.problem import (
@@ -26,7 +27,6 @@ from contactopt.problem import (
 )
 
 MOST_CONTACTS = 24  # contacts
-CERTIFIED = 1e-8  # natural-map residual of a solution
 
 
 def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]:
@@ -60,7 +60,7 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
             continue
         reactions, multipliers = scales.to_physical(r, lam)
         residual = natural_map_residual(problem, reactions, multipliers)
-        if residual <= CERTIFIED:
+        if residual <= TOL:
             known.append(sides_of(scaled, r, lam))
             answer = reactions, multipliers, Status.SOLVED, residual
             found.append(Solution(*answer, tree.branches, "all_solutions"))

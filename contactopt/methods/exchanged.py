@@ -23,6 +23,9 @@ from contactopt.problem.scaling import immovable
 # Contacts around a place that exchange forces, too: on quadratic elements an exchange falls to a
 # thousandth within three elements.
 NEAREST = 40
+# The places along an edge in space exchange forces with each other and over more contacts than
+# these. With so few contacts all are looked at at once, which takes 0.2 s.
+FEW = 200
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
@@ -34,30 +37,42 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
     """
     if not solution.solved or not has_entries(problem.Q):
         return solution
-    points = problem.coordinates.T
-    for at in problem.shared_places:
-        left = False
+    points, found = problem.coordinates.T, problem.shared_places
+    if found and problem.contacts <= FEW:
+        everything = np.arange(problem.contacts)
+        solution = _exchanged(problem, solution, tol, everything, everything)[0]
+    for at in found:
         far = np.linalg.norm(points - points[at[0]], axis=1)
         near = np.argsort(far, kind="stable")[:NEAREST]
-        for contacts in _closed(problem, solution.reactions, near):
-            own, unfelt = exchanges(problem, contacts)
-            if not unfelt.size:
-                continue
-            r, unique = _with_least(solution.reactions, own, unfelt)
-            residual = natural_map_residual(problem, r, solution.multipliers)
-            if residual <= max(solution.residual, tol):
-                solution = replace(solution, reactions=r, residual=residual)
-                left = not unique or _rubs(r[at])
-                break
-            left = True
+        solution, left = _exchanged(problem, solution, tol, near, at)
         if left:
             note(
                 logging.getLogger(__name__),
-                f"at ({place_words(problem.coordinates.T[at[0]])}), where several surfaces meet,"
+                f"at ({place_words(points[at[0]])}), where several surfaces meet,"
                 " the contact forces are not unique: forces that the contacts there exchange"
                 " change nothing else",
             )
     return solution
+
+
+def _exchanged(
+    problem: InterfaceProblem, solution: Solution, tol: float, near: np.ndarray, at: np.ndarray
+) -> tuple[Solution, bool]:
+    """The solution with the least friction that some contacts can exchange, and whether this leaves
+    some at the contacts `at`, or several solutions.
+    """
+    left = False
+    for contacts in _closed(problem, solution.reactions, near):
+        own, unfelt = exchanges(problem, contacts)
+        if not unfelt.size:
+            continue
+        r, unique = _with_least(solution.reactions, own, unfelt)
+        residual = natural_map_residual(problem, r, solution.multipliers)
+        if residual <= max(solution.residual, tol):
+            made = replace(solution, reactions=r, residual=residual)
+            return made, not unique or _rubs(r[at])
+        left = True
+    return solution, left
 
 
 def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

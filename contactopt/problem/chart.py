@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
-
-# a contact nearer than this fraction of the largest place lies on the plane of symmetry
-ON_PLANE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +76,7 @@ class Chart:
         contact (m,) of each; a contact on a plane or axis stands there once.
         """
         x, contact = self.places, np.arange(self.places.shape[1])
-        near = ON_PLANE * np.abs(x).max(initial=0.0)
+        near = EQUAL * np.abs(x).max(initial=0.0)
         for axis in np.flatnonzero(self.mirrored):
             other = np.abs(x[axis]) > near
             image = x[:, other] * np.where(np.arange(len(x)) == axis, -1.0, 1.0)[:, None]

@@ -22,15 +22,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.checks import place_words
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.linear.operators import asymmetry, diagonal, form, has_entries, row_sizes
 from contactopt.problem.cones import polygon, simplex_steps, unit
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.scaling import dimensionless, isotropic
 
 MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
-EXACT = 1e-12  # relative size of what rounding leaves of a zero in the conditions on a ray
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
-APART = 1e-9  # of the extent of the contacts, up to which tied nodes that are held meet
 POLISH = 3  # least-squares steps
 
 log = logging.getLogger(__name__)
@@ -105,7 +104,7 @@ def held_apart(problem: InterfaceProblem) -> Infeasible | None:
     fixed &= ~moves.reshape(fixed.shape)
     apart = np.where(fixed, np.abs(problem.q), 0.0).max(axis=1)
     worst = int(np.argmax(apart))
-    if not apart[worst] > APART * np.ptp(places, axis=1).max(initial=0.0):
+    if not apart[worst] > EQUAL * np.ptp(places, axis=1).max(initial=0.0):
         return None
     where = place_words(places[:, worst])
     sentence = (
@@ -119,7 +118,7 @@ def held_apart(problem: InterfaceProblem) -> Infeasible | None:
 
 def _definite(problem: InterfaceProblem) -> bool:
     """Whether there is no plate and Q a symmetric array, positive definite far above rounding."""
-    if len(problem.s) or form(problem.Q) == "sparse" or asymmetry(problem.Q) > EXACT:
+    if len(problem.s) or form(problem.Q) == "sparse" or asymmetry(problem.Q) > ROUNDED:
         return False
     try:
         pivots = np.diag(np.linalg.cholesky(problem.Q)) ** 2
@@ -141,9 +140,9 @@ def _verified(
     g = (Q.T @ flat + V @ motions).reshape(k, d)
     size = (abs(Q).T @ flat + np.abs(V) @ np.abs(motions)).reshape(k, d).max(axis=1)
     polar = (
-        g[:, 0] + problem.mu * np.linalg.norm(g[:, 1:], axis=1) <= EXACT * (1 + problem.mu) * size
+        g[:, 0] + problem.mu * np.linalg.norm(g[:, 1:], axis=1) <= ROUNDED * (1 + problem.mu) * size
     )
-    free = np.abs(V.T @ flat) <= EXACT * (np.abs(V).T @ flat)
+    free = np.abs(V.T @ flat) <= ROUNDED * (np.abs(V).T @ flat)
     terms = float(np.abs(problem.q[:, 0]) @ weights + np.abs(problem.s) @ np.abs(motions))
     gain = -float(problem.q[:, 0] @ weights + problem.s @ motions)
     return bool(np.all(polar) and np.all(free) and gain > MARGIN * terms > 0)

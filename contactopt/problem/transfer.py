@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.pairs import part_of
 from contactopt.problem.solution import Solution
-
-THIN = 1e-6  # a surface narrower than this fraction of its length is a line
 
 
 def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProblem) -> Solution:
@@ -52,7 +51,7 @@ def transfer(source: InterfaceProblem, solution: Solution, target: InterfaceProb
     if source.dim == 3:
         axes, centre = _plane(old)
         old, new = axes.T @ (old - centre), axes.T @ (new - centre)
-    thin = source.dim == 3 and np.ptp(old[1]) <= THIN * np.ptp(old[0])
+    thin = source.dim == 3 and np.ptp(old[1]) <= CLOSE * np.ptp(old[0])
     if source.dim == 3 and not thin:
         values = _over_a_surface(old.T, new.T, traction)
     else:

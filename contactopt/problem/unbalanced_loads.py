@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.defaults import EQUAL
 from contactopt.errors import Unbalanced
 from contactopt.problem.cones import polygon, simplex_steps
 from contactopt.problem.interface_problem import InterfaceProblem
@@ -29,12 +30,9 @@ from contactopt.problem.scaling import isotropic, without_rounding
 
 # work of the largest load over a motion's displacements from which on the motion counts
 SURE = 1e-6
-SLACK = 1e-9  # by how much rounding may violate the cones, over the size of the motion at a contact
 BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
 TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
-# share of a motion's displacements below which it moves no contact against what it resists
-LOOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +75,7 @@ def escape(problem: InterfaceProblem) -> Escape | None:
 def _described(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> Escape:
     """A motion that loads s (p,) drive, with what it does to which body."""
     g = (problem.V @ motion).reshape(problem.q.shape)
-    still = np.abs(g).max(initial=0.0) <= LOOSE * (np.abs(problem.V) @ np.abs(motion)).max()
+    still = np.abs(g).max(initial=0.0) <= EQUAL * (np.abs(problem.V) @ np.abs(motion)).max()
     opens = bool(np.abs(g[:, 1:]).max(initial=0.0) <= FLAT * np.abs(g).max(initial=0.0))
     owners = [name.partition(":")[0] for name in problem.motions] or ["" for _ in s]
     work = {
@@ -102,7 +100,7 @@ def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
     sizes = np.where(sizes > 0, sizes, 1.0)
     moved = np.vstack([(problem.V / sizes)[resists.ravel()], np.zeros((count, count))])
     _, stretches, axes = np.linalg.svd(np.linalg.qr(moved, mode="r"))
-    held, basis = stretches >= LOOSE, without_rounding(axes.T) / sizes[:, None]
+    held, basis = stretches >= EQUAL, without_rounding(axes.T) / sizes[:, None]
     return basis[:, held], basis[:, ~held]
 
 
@@ -211,14 +209,14 @@ def _passes(
     g = (problem.V @ motion).reshape(problem.q.shape)
     size = np.abs(problem.V) @ np.abs(motion)
     slide = np.linalg.norm(g[:, 1:], axis=1)
-    fixed = _stuck(problem, given) & (slide > SLACK * size.max())
+    fixed = _stuck(problem, given) & (slide > EQUAL * size.max())
     needed = np.where(fixed, np.inf, problem.mu * slide)
     shut = problem.law.lowest < 0
     work = s * motion
     lost = np.sum(given[np.isfinite(given)] * slide[np.isfinite(given)])
     return bool(
-        np.all((g[:, 0] - needed)[~shut] >= -SLACK * size.max())
-        and np.all(np.abs(g[shut, 0]) <= SLACK * size.max())
+        np.all((g[:, 0] - needed)[~shut] >= -EQUAL * size.max())
+        and np.all(np.abs(g[shut, 0]) <= EQUAL * size.max())
         and not np.any(fixed & shut)
         and work.sum() - lost > SURE * np.abs(work).sum()
     )

@@ -21,7 +21,6 @@ STEPS, SETTLED, SINGULAR = 20, 1e-12, 1e-12  # of its iteration
 FITTED = {2: 5, 3: 13}
 NEIGHBOURS = {2: 5, 3: 9}  # nodes among which a local maximum is the largest, itself among them
 MOST_PEAKS = 8  # local maxima that are looked at
-EQUAL = 1e-9  # share by which rounding parts equal values, far more than it does
 # least uncertainty of an edge that is read between nodes, over the distance of the nodes: by a
 # straight line, and by a root times a polynomial
 WITHIN, FITTED_WITHIN = 0.05, 0.025

@@ -7,10 +7,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial import KDTree
 
+from contactopt.bodies.views import elements_of
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import facet_nodes
@@ -18,9 +20,12 @@ from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.readings.resultants import space_forces
+from contactopt.scenes.scene import Part
 
 # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
 NEAR = 1.5
+AT = 1e-9  # of the size of a surface, within which a contact lies at a node
+STATUS = ("open", "stick", "slip")
 CELLS = {2: "line", 3: "triangle", 4: "quad"}  # by their corners
 
 
@@ -39,6 +44,8 @@ class ContactFields:
                    against lower [length]
     status         (k,) 0 open, 1 stick, 2 slip
     normals        (k, dim) from the lower to the upper body;  first  (k,) initial gap [length]
+    nodes          name of a body with a mesh -> (k,) its node that the contact lies at, as the
+                   points of its VTU file are numbered, from 0 on; -1 where there is none
     """
 
     name: str
@@ -52,6 +59,7 @@ class ContactFields:
     status: np.ndarray
     normals: np.ndarray
     first: np.ndarray
+    nodes: dict[str, np.ndarray]
 
     @property
     def data(self) -> dict[str, np.ndarray]:
@@ -64,16 +72,22 @@ class ContactFields:
             "contact_status": self.status.astype(float),
         }
 
-    def rows(self, axes: Sequence[str], units: tuple[str, str]) -> tuple[list[str], np.ndarray]:
-        """The head of a table with the units of length and stress, and one row per contact; status
-        as in `status`.
+    def rows(self, axes: Sequence[str], units: tuple[str, str]) -> tuple[list[str], list[Any]]:
+        """The head of a table with the units of length and stress, and one row per contact, empty
+        where it lies at no node of a body.
         """
         length, stress = units
         head = [*(f"{axis} [{length}]" for axis in axes), f"area [{length}^2]"]
         head += [f"pressure [{stress}]", *(f"traction_{axis} [{stress}]" for axis in axes)]
         head += [f"gap [{length}]", *(f"slip_{axis} [{length}]" for axis in axes), "status"]
         columns = [*self.points, self.areas, self.pressure, *self.traction]
-        return head, np.column_stack([*columns, self.gap, *self.slip, self.status])
+        numbers = np.column_stack([*columns, self.gap, *self.slip]).tolist()
+        words = np.array(STATUS)[self.status.astype(int)].tolist()
+        found = [[*row, word] for row, word in zip(numbers, words)]
+        for nodes in self.nodes.values():
+            for row, node in zip(found, nodes.tolist()):
+                row.append(node if node >= 0 else "")
+        return [*head, *(f"node of {name}" for name in self.nodes)], found
 
     def write_vtu(self, path: Path) -> None:
         """The surface as a VTU file with its quantities at the contacts."""
@@ -127,9 +141,27 @@ def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFie
                 state[own],
                 coupling.frames[:, 0],
                 coupling.gap,
+                _nodes(reduction, pair.name, coupling.positions),
             )
         )
     return tuple(made)
+
+
+def _nodes(reduction: Reduction, name: str, places: np.ndarray) -> dict[str, np.ndarray]:
+    """The nodes of both bodies of a pair at these places (dim, k), by the names of the bodies."""
+    scene, found = reduction.scene, dict[str, np.ndarray]()
+    (pair,) = (own for own in scene.pairs if own.name == name)
+    near = AT * (float(np.ptp(places, axis=1).max(initial=0.0)) or 1.0)
+    for part, body in zip(scene.parts, reduction.bodies):
+        elements = elements_of(body)
+        if part.name not in pair.bodies or elements is None or not isinstance(part, Part):
+            continue
+        mesh = elements.basis.mesh
+        surface = pair.surfaces[pair.bodies.index(part.name)] or part.contact
+        nodes = facet_nodes(mesh, mesh.boundaries[surface])
+        apart, nearest = KDTree(mesh.p[:, nodes].T).query(places.T)
+        found[part.name] = np.where(apart <= near, nodes[nearest], -1)
+    return found
 
 
 def on_nodes(

@@ -31,8 +31,8 @@ from numpy.polynomial.chebyshev import chebvander
 from scipy.spatial import KDTree
 
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import EQUAL
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.chart import ON_PLANE
 from contactopt.problem.contact_status import ContactStatus, contact_status
 from contactopt.readings.constants import (
     FAR,
@@ -85,7 +85,7 @@ def is_level(problem: InterfaceProblem, frames: np.ndarray, reactions: np.ndarra
 def _is_ring(scene: Scene, problem: InterfaceProblem) -> bool:
     """Whether an axisymmetric contact surface does not reach the axis."""
     radius = np.abs(problem.coordinates[0])
-    return scene.analysis.revolved and bool(np.min(radius) > ON_PLANE * np.max(radius))
+    return scene.analysis.revolved and bool(np.min(radius) > EQUAL * np.max(radius))
 
 
 def contact_edge(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:

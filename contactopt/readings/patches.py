@@ -13,17 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.problem import InterfaceProblem
-from contactopt.problem.chart import ON_PLANE, Chart
+from contactopt.problem.chart import Chart
 from contactopt.readings.constants import RING, ROUNDNESS
 
 # distances that differ by less than this fraction of an element belong to one ring of nodes
 SAME = 1e-5
-CENTRE = 1e-12  # relative change of a patch's edges at which its centre is known
-FARTHEST = (
-    1.12  # between 1, of a disc, and 1.25, of a square: the farthest point over that of a disc
-)
-ON_A_LINE = 1e-12  # the least second moment over the largest of contacts that lie on one line
+# between 1, of a disc, and 1.25, of a square: the farthest point over that of a disc
+FARTHEST = 1.12
 ROUNDS = 20  # of that iteration, which gains about two digits in each
 
 # rings of nodes next to the edge: how many are left out, how many are fitted
@@ -141,7 +139,7 @@ class Patch:
                 return None
             before, first, last = (first, last), centre - left[0], centre + right[0]
             uncertainty = (left[1] + right[1]) / 2
-            if max(abs(first - before[0]), abs(last - before[1])) <= CENTRE * (last - first):
+            if max(abs(first - before[0]), abs(last - before[1])) <= ROUNDED * (last - first):
                 break
         step = self.step(self.contact, self.place, last)
         return Ends(first, last, self.copies, uncertainty, step)
@@ -215,7 +213,7 @@ def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
     """Whether a patch and its mirror image are one: no contact lies between them but one on the
     plane. (That on an axis of revolution has no area, perhaps no force, and does not divide them.)
     """
-    plane = ON_PLANE * np.abs(place).max()
+    plane = EQUAL * np.abs(place).max()
     off_plane = np.abs(place[np.abs(place) > plane])
     nearest = np.abs(patch).min()
     touches = np.abs(place).min() <= plane
@@ -275,7 +273,7 @@ def _as_disc(
     if any(problem.chart.mirrored):
         moments = np.diag(np.diag(moments))
     values, axes = np.linalg.eigh(moments)
-    if values[0] <= ON_A_LINE * values[1]:
+    if values[0] <= ROUNDED * values[1]:
         return x, 1.0
     factors = (values[0] * values[1]) ** 0.25 / np.sqrt(values)
     return np.asarray(axes * factors @ axes.T @ x), float(factors[0])

@@ -15,10 +15,11 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import EQUAL
 from contactopt.meshes.cells import joined
 from contactopt.problem import InterfaceProblem, Solution
-from contactopt.problem.chart import ON_PLANE, Chart
-from contactopt.readings.constants import EQUAL, FITTED, MOST_PEAKS, NEIGHBOURS
+from contactopt.problem.chart import Chart
+from contactopt.readings.constants import FITTED, MOST_PEAKS, NEIGHBOURS
 from contactopt.readings.patches import least
 
 # Of the value, times the share of the fitted contacts on a surface that lie beside open ones, which
@@ -81,7 +82,7 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     usable = problem.areas > 0
     if reduction.scene.analysis.revolved:
         radius = np.abs(problem.coordinates[0])
-        beside = usable & (radius > ON_PLANE * radius.max(initial=0.0))
+        beside = usable & (radius > EQUAL * radius.max(initial=0.0))
         usable = beside if np.any(pressure[beside] > 0) else usable
     noise = solution.residual * float(np.linalg.norm(solution.reactions))
     found = []

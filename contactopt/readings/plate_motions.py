@@ -16,13 +16,13 @@ import numpy as np
 
 from contactopt.bodies.protocol import Body
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import ROUNDED
 from contactopt.problem import Solution
 
 if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
 
 CLOSED = 1e-3  # a mean direction shorter than this is that of a surface around a body
-ROUNDED = 1e-12  # share of the motions of the bodies below which what they make is rounding
 TINY = 1e-15  # share of the extent of the contacts below which a motion is rounding
 
 

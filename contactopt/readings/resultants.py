@@ -11,15 +11,13 @@ import numpy as np
 
 from contactopt.bodies.views import acting, held_by, plates
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import EQUAL
 from contactopt.problem import Solution, alone
 from contactopt.problem.cones import lengths
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_area, contact_zone, is_level, stick_width
 from contactopt.readings.peaks import nodal_pressure
 from contactopt.scenes.kinds import KINDS
-
-ROUNDING = 1e-9  # components below this share of the force are written as zero
-ALONG = 1e-9  # by how much the normal of a plane may miss a coordinate axis and still lie along it
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +58,7 @@ def mirrors(reduction: Reduction) -> list[dict[str, Any]]:
     made = []
     for plane in reduction.planes:
         axis = int(np.argmax(np.abs(plane.inward)))
-        if abs(plane.inward[axis]) < 1 - ALONG:
+        if abs(plane.inward[axis]) < 1 - EQUAL:
             return []
         place = float(plane.offset / plane.inward[axis]) + 0.0
         made.append({"axis": scene.components[axis], "place": place})
@@ -121,7 +119,7 @@ def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
     words = {}
     for name, pair in summary["pairs"].items():
         known = [f or 0.0 for f in (*pair["force"], pair["normal_force"])]  # None: not finite
-        least = ROUNDING * max(map(abs, known))
+        least = EQUAL * max(map(abs, known))
         words[name] = ", ".join(
             f"{axis} {f if abs(f) > least else 0.0:.6g}" for axis, f in zip(axes, known)
         )

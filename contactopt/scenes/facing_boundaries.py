@@ -16,12 +16,12 @@ import numpy as np
 from scipy.spatial import KDTree
 from skfem import Mesh
 
+from contactopt.defaults import CLOSE
 from contactopt.meshes.cells import area_vectors, outer_corners
 
 OPPOSED = -0.7  # cosine of the angle between normals
 NEAREST = 12  # facets of the other body that are tried
 SIZE = 0.005  # usual distance, over the diagonal of the box around all bodies
-CLOSED = 1e-6  # of the distance, within which a gap is what rounding leaves of zero
 LEAST = 0.02  # of the area of the smaller boundary, which must face the other one
 
 
@@ -127,7 +127,7 @@ def _pairs(upper: str, one: _Surface, lower: str, two: _Surface, distance: float
     made, covered = [], np.zeros(len(i), dtype=bool)
     for share, first, second, chosen in sorted(tried, key=lambda own: -own[0]):
         if not covered[chosen].all():
-            own = np.where(np.abs(gap[chosen]) < CLOSED * distance, 0.0, gap[chosen])
+            own = np.where(np.abs(gap[chosen]) < CLOSE * distance, 0.0, gap[chosen])
             gaps = float(own.min()), float(own.max())
             made.append(Facing(((upper, first), (lower, second)), float(share), gaps))
         covered |= chosen

@@ -21,6 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.checks import check_name, check_size, real_array, short
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.scenes.body_kinds import Body, Support
 from contactopt.scenes.kinds import KINDS
@@ -33,7 +34,6 @@ ORDERS = ("auto", "node", "component")
 SIZES = {2: (2, 3), 3: (3, 4, 6, 8, 9)}  # dimension -> how many points a facet may have
 # stiffness against itself of an unknown over the median of all: conditions by penalty are above
 PENALTY = 1e9
-SYMMETRIC = 1e-9  # largest |K - K'| over the largest |K|
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ class MatrixPart:
         if K.shape[0] != K.shape[1] or not K.nnz:
             raise self._wrong(f"K must be square and not empty; got the shape {K.shape}.")
         lack = abs(K - K.T)
-        if lack.max() > SYMMETRIC * abs(K).max():
+        if lack.max() > EQUAL * abs(K).max():
             i, j = (int(each) for each in np.unravel_index(lack.argmax(), K.shape))
             raise self._wrong(
                 f"K is not symmetric: entry ({i}, {j}) is {K[i, j]:.6g} and ({j}, {i}) is"

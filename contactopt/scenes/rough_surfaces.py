@@ -7,9 +7,8 @@ import math
 import numpy as np
 
 from contactopt.checks import check_count, check_number, check_positive
+from contactopt.defaults import ROUNDED
 from contactopt.errors import InputError
-
-ROUND = 1e-12  # relative rounding of lengths that are compared
 
 
 def self_affine(
@@ -44,12 +43,12 @@ def self_affine(
     for axis, count in zip("xy", points):
         check_count(f"the number of points along {axis}", count)
     check_positive(**{"length along x": lengths[0], "length along y": lengths[1], "slope": slope})
-    check_number("Hurst's exponent", hurst, low=0.0, high=1.0 + ROUND)
+    check_number("Hurst's exponent", hurst, low=0.0, high=1.0 + ROUNDED)
     longest, shortest, roll_off = _wavelengths(points, lengths, longest, shortest, roll_off)
-    reach = [math.floor(size / shortest * (1 + ROUND)) for size in lengths]
+    reach = [math.floor(size / shortest * (1 + ROUNDED)) for size in lengths]
     orders = np.meshgrid(*[np.arange(-m, m + 1) for m in reach], indexing="ij")
     k = np.hypot(orders[0] / lengths[0], orders[1] / lengths[1])
-    passed = (k >= (1 - ROUND) / longest) & (k <= (1 + ROUND) / shortest)
+    passed = (k >= (1 - ROUNDED) / longest) & (k <= (1 + ROUNDED) / shortest)
     if not passed.any():
         raise InputError(
             "no wave of the period lies between the shortest and the longest wavelength; widen the"
@@ -73,12 +72,12 @@ def _wavelengths(
     roll_off = longest if roll_off is None else roll_off
     for name, value in (("longest", longest), ("shortest", shortest), ("roll-off", roll_off)):
         check_number(f"{name} wavelength", value, low=0.0)
-    if not 2 * spacing * (1 - ROUND) <= shortest <= roll_off <= longest:
+    if not 2 * spacing * (1 - ROUNDED) <= shortest <= roll_off <= longest:
         raise InputError(
             f"the wavelengths must grow from two spacings ({2 * spacing:g}) to shortest, roll_off"
             f" and longest; got {shortest:g}, {roll_off:g} and {longest:g}."
         )
-    if any(2 * math.floor(L / shortest * (1 + ROUND)) >= n for L, n in zip(lengths, points)):
+    if any(2 * math.floor(L / shortest * (1 + ROUNDED)) >= n for L, n in zip(lengths, points)):
         raise InputError(
             f"the shortest wavelength ({shortest:g}) must be longer than two spacings"
             f" ({2 * spacing:g})."

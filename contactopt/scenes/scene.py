@@ -44,6 +44,10 @@ __all__ = [
 MOST_ACROSS = 100_000  # elements across the contact half-width
 
 
+class Listed(tuple[Bolt, ...]):
+    """Bolts that the bodies of a scene have already; dataclasses.replace hands them on."""
+
+
 @dataclass(frozen=True)
 class Scene:
     """Bodies that may touch each other.
@@ -66,7 +70,8 @@ class Scene:
                are those on which supports hold the normal alone
     state      name of the step of a load path to which this state belongs
     bolts      that pull faces of the bodies together; their ends become loads of the bodies, which
-               `bolt_ends` lists. None: those that the bodies have
+               `bolt_ends` lists. None: those that the bodies have. The attribute lists the bolts
+               that the bodies have now; to put those of another scene, give tuple(other.bolts)
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly
                incompressible bodies, where linear elements lock. By default that of the meshes: 2
                if one that is given has elements of second order, else 1.
@@ -111,7 +116,7 @@ class Scene:
                     "a body must be a Part, a MatrixPart, a Rigid or a HalfSpace; got"
                     f" {short(part)}."
                 )
-        if bolts is not None:
+        if bolts is not None and not isinstance(bolts, Listed):
             self._put(bolts)
         check_size("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
@@ -315,6 +320,19 @@ class Scene:
         for name in names:
             if not any(name in pair.bodies for pair in pairs):
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")
+
+
+def _bolts(scene: Scene) -> Listed:
+    """The bolts of a scene, as its bodies have them now."""
+    made = []
+    for name, ends in scene.bolt_ends.items():
+        (one, first), (other, last) = ends
+        faces = f"{one.name}.{first.boundary}", f"{other.name}.{last.boundary}"
+        made.append(Bolt(faces, first.pull, name, first.tilting, first.direction))
+    return Listed(made)
+
+
+Scene.bolts = property(_bolts)  # type: ignore[attr-defined]
 
 
 def check_units(units: object) -> None:

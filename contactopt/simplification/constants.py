@@ -1,9 +1,5 @@
 """The chosen numbers of these simplifications, whose effect `tests/test_simplest.py` checks."""
 
-# What counts as equal (contactopt.simplification.images). The proof on the whole has the last word.
-NEAR = 1e-9  # distance of nodes from their images, over the size of the scene
-EQUAL = 1e-9  # difference of loads, gaps and friction from their images, over their own values
-ROUNDED = 1e-12  # the same over the largest value anywhere: what rounding leaves where a gap closes
 BETWEEN = 8  # intervals of each edge of a facet at whose ends gaps and friction are compared
 
 # Proofs (contactopt.simplification.proof).

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from skfem import Mesh
 
+from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved, straight
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part, Rigid, Scene, Support
-from contactopt.simplification.constants import NEAR
 from contactopt.simplification.images import Images, Plane
 from contactopt.simplification.proof import Fold, Key
 from contactopt.simplification.whole import Whole, of_mesh, with_pairs
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def half_of(whole: Whole, plane: Plane, images: Images) -> tuple[Scene, Fold]:
     """The positive half, and how the whole lies on it; InputError if elements are cut."""
-    scene, near = whole.scene, NEAR * whole.size
+    scene, near = whole.scene, EQUAL * whole.size
     component = scene.components[int(np.argmax(np.abs(plane.normal)))]
     heights = {name: float(np.mean(plane.height(mesh.p))) for name, mesh in whole.meshes.items()}
     kept = {name for name in heights if images.bodies[name] == name or heights[name] > 0}
@@ -60,7 +60,7 @@ def half_mesh(plane: Plane, cut: str) -> Callable[[Any], Any]:
     """The function that takes the elements above a plane, with a boundary of that name in it."""
 
     def change(mesh: Mesh) -> Any:
-        near = NEAR * float(np.ptp(mesh.p, axis=1).max())
+        near = EQUAL * float(np.ptp(mesh.p, axis=1).max())
         height = plane.height(mesh.p)[mesh.t]
         if np.any((height.min(axis=0) < -near) & (height.max(axis=0) > near)):
             raise InputError(
@@ -99,7 +99,7 @@ def roller(whole: Whole) -> str:
             nodes = np.unique(mesh.facets[:, mesh.boundaries[support.boundary]])
             for component in support.displacement or {}:
                 row = mesh.p[whole.scene.components.index(component), nodes]
-                if np.ptp(row) < NEAR * whole.size and np.isin(nodes, contacts).any():
+                if np.ptp(row) < EQUAL * whole.size and np.isin(nodes, contacts).any():
                     return f"the support on {support.boundary!r} of body '{name}'"
     return ""
 
@@ -115,7 +115,7 @@ def _keeps(pair: Contact, whole: Whole, images: Images, kept: set[str], plane: P
         float(plane.height(whole.corners(*surface)).mean()) for surface in whole.surfaces(pair)
     ]
     farthest = max(middles, key=abs)
-    if abs(farthest) > NEAR * whole.size:
+    if abs(farthest) > EQUAL * whole.size:
         return farthest > 0
     return bool(pair.name < images.pairs[pair.name])
 
@@ -153,7 +153,7 @@ def _half_part(whole: Whole, images: Images, part: Part, plane: Plane, component
         cut += "'"
 
     def there(boundary: str) -> bool:
-        return bool(plane.height(whole.corners(name, boundary)).max() > NEAR * whole.size)
+        return bool(plane.height(whole.corners(name, boundary)).max() > EQUAL * whole.size)
 
     supports = [item for item in part.supports if there(item.boundary)]
     supports.append(Support(cut, {component: 0.0}))

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.spatial import KDTree
 from skfem import Mesh
 
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Part
-from contactopt.simplification.constants import EQUAL, NEAR, ROUNDED
 from contactopt.simplification.whole import Whole
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Plane:
     def words(self, components: tuple[str, ...]) -> str:
         """'x = 0', or '0.866 x + 0.5 y = 3'."""
         pairs = zip(self.normal, components)
-        terms = [(value, component) for value, component in pairs if abs(value) > NEAR]
+        terms = [(value, component) for value, component in pairs if abs(value) > EQUAL]
         sign = np.sign(terms[0][0])
         factors = ["" if len(terms) == 1 else f"{sign * value:.4g} " for value, _ in terms]
         text = " + ".join(factor + component for factor, (_, component) in zip(factors, terms))
@@ -111,7 +111,7 @@ def _images_of_meshes(whole: Whole, plane: Plane) -> dict[str, tuple[str, np.nda
     found: dict[str, tuple[str, np.ndarray]] = {}
     for name, mesh in whole.meshes.items():
         for image in (name, *whole.meshes):
-            nodes = _nodes(mesh, whole.meshes[image], plane, NEAR * whole.size)
+            nodes = _nodes(mesh, whole.meshes[image], plane, EQUAL * whole.size)
             if nodes is not None:
                 found[name] = image, nodes
                 break

@@ -11,13 +11,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.simplification.findings import PARTS, Simplification
 from contactopt.simplification.halves import half_of, roller
 from contactopt.simplification.images import Images, Plane, images_under
 from contactopt.simplification.whole import Whole, whole_of
 
-ACROSS = 1e-6  # cosine below which two normals are across each other
 UNIQUE = "Exact wherever the solution is unique."
 NONE = (
     "No plane makes the meshes their own mirror images. To use a symmetry of the bodies, mesh one"
@@ -99,7 +99,7 @@ def _candidates(whole: Whole) -> Iterator[Plane]:
     known = [axes[1]] if revolved else [*axes]
     if not revolved:
         principal = np.linalg.eigh(np.cov(points))[1].T
-        known += [axis for axis in principal if np.all(np.abs(np.abs(axes @ axis) - 1) > ACROSS**2)]
+        known += [axis for axis in principal if np.all(np.abs(np.abs(axes @ axis) - 1) > CLOSE**2)]
     for normal in known:
         along = normal @ points
         yield Plane(normal, float(along.min() + along.max()) / 2)

@@ -27,10 +27,10 @@ from contactopt.bodies import assemble
 from contactopt.bodies.assembly import Assembly
 from contactopt.coupling.coupling import Coupling, couple, law_of
 from contactopt.coupling.crosspoints import independent
+from contactopt.defaults import EQUAL
 from contactopt.problem.certificate import Yardsticks, yardsticks
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import Scene
-from contactopt.simplification.constants import NEAR
 from contactopt.solving.solve_scene import Solved
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ class Spread:
         there, own = self.part.reduction.couplings[number], pairs[number].contacts
         # two contacts at a corner differ in their normals
         towards = np.einsum("kab,ka->bk", turns, made.frames[:, 0])
-        aside = NEAR * float(np.ptp(there.positions, axis=1).max(initial=0.0))
+        aside = EQUAL * float(np.ptp(there.positions, axis=1).max(initial=0.0))
         contacts = _nearest(there.positions + aside * there.frames[:, 0].T, x + aside * towards)
         force = np.einsum("kac,ka->kc", there.frames, self.part.solution.reactions[own])[contacts]
         # A contact of the part stands for several of the whole, or for a slice of one.
@@ -141,7 +141,7 @@ class Spread:
 def _nearest(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """The number of the point at each wanted place; LookupError if one of them has none."""
     distance, number = KDTree(points.T).query(wanted.T)
-    if distance.max(initial=0.0) > 10 * NEAR * float(np.ptp(points, axis=1).max(initial=0.0)):
+    if distance.max(initial=0.0) > 10 * EQUAL * float(np.ptp(points, axis=1).max(initial=0.0)):
         raise LookupError
     return np.asarray(number)
 

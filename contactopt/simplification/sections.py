@@ -18,8 +18,8 @@ import skfem
 from scipy.spatial import KDTree
 from skfem import Mesh
 
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.scenes.scene import Scene
-from contactopt.simplification.constants import NEAR, ROUNDED
 from contactopt.simplification.findings import Simplification
 from contactopt.simplification.images import equal_functions
 from contactopt.simplification.proof import Key
@@ -49,7 +49,7 @@ class _Prism:
     def on_end(self, mesh: Mesh, place: float) -> np.ndarray:
         """Numbers of the facets of a mesh on an end."""
         at = mesh.p[self.axis][mesh.facets]
-        return np.flatnonzero(np.abs(at - place).max(axis=0) < NEAR * self.whole.size)
+        return np.flatnonzero(np.abs(at - place).max(axis=0) < EQUAL * self.whole.size)
 
     def flat(self, mesh: Mesh) -> Any:
         """The section of a mesh; its edges bear the names of the boundaries that stand on them."""
@@ -61,7 +61,7 @@ class _Prism:
         middles = made.p[:, made.facets[:, outer]].mean(axis=1)
         for name, facets in (mesh.boundaries or {}).items():
             there = mesh.p[self.axes][:, mesh.facets[:, facets]].mean(axis=1)
-            own = KDTree(there.T).query(middles.T)[0] < NEAR * self.whole.size
+            own = KDTree(there.T).query(middles.T)[0] < EQUAL * self.whole.size
             names |= {name: outer[own]} if own.any() else {}
         return made.with_boundaries(names)
 
@@ -90,7 +90,7 @@ def _prisms(whole: Whole) -> Iterator[_Prism]:
             if not len(first) or len(first) != len(last):
                 break
             flat = mesh.p[prism.axes]
-            if KDTree(flat[:, first].T).query(flat.T)[0].max() > NEAR * whole.size:
+            if KDTree(flat[:, first].T).query(flat.T)[0].max() > EQUAL * whole.size:
                 break
         else:
             yield prism

@@ -13,8 +13,7 @@ from pathlib import Path
 
 from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem
-
-PATIENCE = 2.0  # seconds of a solve about which nothing is said
+from contactopt.screen import PATIENCE
 
 
 def progress_lines(

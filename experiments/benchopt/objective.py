@@ -4,7 +4,7 @@
     benchopt run experiments/benchopt -d 'contacts[problem=punch-2d]'
 
 The value of an answer is its certificate, which is computed from the problem: the natural-map
-residual, dimensionless, 0 at a solution. A solver of yours is one more file in `solvers/`.
+residual, dimensionless, 0 at a solution. Your own solver is one more file in `solvers/`.
 """
 
 import numpy as np

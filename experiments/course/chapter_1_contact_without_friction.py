@@ -21,7 +21,7 @@ from contactopt.teaching import Slider
 # the folder of the repository, where the exercises are
 sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
-from experiments.course.sketch import arrow
+from experiments.course.sketch import arrow, spring
 
 # %% [markdown]
 # ## The mechanical system
@@ -48,13 +48,7 @@ k, g0, F = 2.0, 1.0, 5.0  # N/mm, mm, N
 def sketch(ax, u, r):
     ax.axhspan(-0.5, 0, color="0.8", lw=0)
     ax.axhline(0, color="k", lw=1)
-    y = np.linspace(u, 3, 13)
-    ax.plot(
-        np.concatenate([[0], 0.15 * (-1.0) ** np.arange(11), [0]]),
-        y,
-        "C0",
-        lw=1.5,
-    )
+    spring(ax, (0, u), (0, 3))
     ax.plot([-0.6, 0.6], [3, 3], "k", lw=3)
     ax.plot(0, u, "o", ms=10, color="C0")
     arrow(ax, (0.5, u + 0.6), (0.5, u), "$F$", "C3")

@@ -25,7 +25,7 @@ from contactopt.teaching import Slider
 # the folder of the repository, where the exercises are
 sys.path.extend([".", "../.."])
 from experiments.course.grader import check, hint, table
-from experiments.course.sketch import arrow
+from experiments.course.sketch import arrow, spring
 
 # %% [markdown]
 # ## The mechanical system
@@ -68,13 +68,7 @@ fig, ax = plt.subplots(figsize=(4.6, 3.6), layout="constrained")
 ax.axhspan(-0.5, 0, color="0.8", lw=0)
 ax.axhline(0, color="k", lw=1)
 for end in ((0, 2.2), (1.5, 1.9)):
-    way, side = (
-        np.array(end) - [0, 0.4],
-        np.array([-(end[1] - 0.4), end[0]]) / np.hypot(end[0], end[1] - 0.4),
-    )
-    steps = np.linspace(0, 1, 13)[:, None]
-    zigzag = np.concatenate([[0], 0.13 * (-1.0) ** np.arange(11), [0]])[:, None]
-    ax.plot(*([0, 0.4] + steps * way + zigzag * side).T, "C0", lw=1.5)
+    spring(ax, (0, 0.4), end)
     ax.plot(*end, "ks", ms=8)
 ax.plot(0, 0.4, "o", ms=11, color="C0")
 for tail, head, name, color in (

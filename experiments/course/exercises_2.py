@@ -1,22 +1,13 @@
 """The exercises of chapter 2: friction at one node."""
 
-import cvxpy as cp
 import numpy as np
 
-from contactopt import InterfaceProblem, all_solutions
+from contactopt import InterfaceProblem, all_solutions, laws, solve
 from experiments.course.feedback import Forces, Open
 
 Q, q = np.array([[1.0, -1.0], [-1.0, 2.0]]), np.array([-3.0, 5.0])  # the node of the chapter
 APART = np.diag([1.2, 2.5]), np.array([-1.5, 1.1])
 SPACE = np.diag([1.0, 1.0, 3.0]), np.array([-2.0, 1.5, 2.0])
-
-
-def associated(Q: np.ndarray, q: np.ndarray, mu: float) -> np.ndarray:
-    """The forces of the minimum over the cone."""
-    r = cp.Variable(len(q))
-    cost = cp.quad_form(r, cp.psd_wrap(Q)) / 2 + q @ r
-    cp.Problem(cp.Minimize(cost), [cp.SOC(mu * r[0], r[1:])]).solve(solver=cp.CLARABEL)
-    return r.value
 
 
 def another_load(load: np.ndarray) -> str | None:
@@ -38,7 +29,10 @@ GRADED = {
     "2.1": (lambda: Forces(InterfaceProblem(APART[0], [APART[1]], 0.3)),),
     "2.3": (
         lambda: Forces(InterfaceProblem(Q, [q], 1.5)),
-        (lambda: associated(Q, q, 1.5), "associated"),
+        (
+            lambda: solve(InterfaceProblem(Q, [q], laws.Associated(1.5)), tol=1e-10).reactions,
+            "associated",
+        ),
     ),
     "2.7": (lambda: Open((0.13, -0.55), another_load),),
     "2.9": (lambda: Forces(InterfaceProblem(SPACE[0], [SPACE[1]], 0.5)),),

@@ -6,7 +6,7 @@ import numpy as np
 
 from contactopt import InterfaceProblem
 from experiments.course.feedback import Forces
-from experiments.course.quantities import Numbers, by_hand
+from experiments.course.quantities import Numbers
 
 f = 8.0  # N/mm: the weight per length of the chapter's string, 1 mm long, under 1 N
 
@@ -77,22 +77,7 @@ def carried() -> np.ndarray:
     return touching(*string(40, 0.19)[1:])
 
 
-a = np.sqrt(2 * 0.07 / f)
-
-
 GRADED = {
-    "3.1": (
-        None,
-        (a / np.sqrt(2), "The parabola is f x^2 / (2 T): a factor of two is missing."),
-        (0.5 - a, "This is the distance from the middle. Give that from the end."),
-        (2 * a, "This is the length that hangs at both ends together."),
-    ),
-    "3.2": (
-        None,
-        (1 - a, "The string hangs at both ends."),
-        (2 * a, "This is the part that the ends carry."),
-        (f * (1 - 2 * a), "This is a force [N]. Divide it by the whole weight f L."),
-    ),
     "3.3": (
         lambda: Forces(hill_problem()),
         (lambda: touching(*string(40)[1:]), "penetration"),

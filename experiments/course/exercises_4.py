@@ -10,7 +10,7 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 from contactopt import InterfaceProblem, laws, solve
 from experiments.course.feedback import Forces, Open
-from experiments.course.quantities import Numbers, by_hand
+from experiments.course.quantities import Numbers
 
 E, nu = 5.0, 0.3  # MPa, -: the block of the chapter
 
@@ -98,7 +98,7 @@ GRADED = {
     "4.4": (
         lambda: Numbers(
             float(stiffest()[-1]),
-            given={"gamma_0 of the text": 10.0, "E": E},
+            given={"gamma_0 of the text": 10.0, "E": E, "h": 0.125},
             least=(0.0, "gamma_0 is positive: only a positive gamma pushes."),
         ),
         (lambda: stiffest()[-1] * E * 8, "This is gamma = gamma_0 E / h. Give gamma_0."),

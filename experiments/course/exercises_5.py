@@ -6,7 +6,7 @@ import numpy as np
 
 from contactopt import InterfaceProblem, diagnose, laws, reduce, scenes, solve
 from experiments.course.feedback import Forces, Open
-from experiments.course.quantities import Numbers, by_hand
+from experiments.course.quantities import Numbers
 
 
 @cache
@@ -38,12 +38,6 @@ def rate() -> float:
     return diagnose(punch(), solve(punch())).local.tresca_rate
 
 
-def on_the_cone(shift: float) -> np.ndarray:
-    """The point of the cone |r_t| <= 0.4 r_n nearest to r - 2 (u + shift n), outside of it."""
-    y, edge = np.array([2.3 - 2 * (0.1 + shift), -1.5 - 2 * 0.3]), np.array([1.0, -0.4])
-    return (y @ edge) / (edge @ edge) * edge
-
-
 def slides(motion: np.ndarray) -> str | None:
     """Whether a motion proves that no forces hold the sledge."""
     up, along = motion
@@ -72,15 +66,6 @@ GRADED = {
         (lambda: rate() ** 4, "This is the factor of four steps. Take the fourth root."),
         (lambda: 1 / rate(), "The certificate falls: divide the later by the earlier one."),
         (lambda: rate() / 4, "Factors multiply. Take a root, and do not divide."),
-    ),
-    "5.5": (
-        None,
-        (lambda: on_the_cone(0.0), "This is the projection on the cone: associated friction."),
-    ),
-    "5.6": (
-        None,
-        (lambda: on_the_cone(0.0), "The shift mu |u_t| n is missing: this is associated friction."),
-        (lambda: on_the_cone(-0.4 * 0.3), "The shift makes u_n larger, so that y_n is smaller."),
     ),
     "5.7": (
         lambda: Forces(punch(0.35)),

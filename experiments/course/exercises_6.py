@@ -5,18 +5,12 @@ from functools import cache
 import cvxpy as cp
 import numpy as np
 
-from contactopt import InterfaceProblem, Material, laws, models, solve
-from contactopt.analytic import contact_modulus, hertz_point
+from contactopt import InterfaceProblem, laws, models, solve
 from contactopt.methods.preconditioners.circulant import seminorm
 from experiments.course.feedback import Displacements
-from experiments.course.quantities import Numbers, by_hand
+from experiments.course.quantities import Numbers
 
-RUBBER = Material(E=5.5, nu=0.42)
 NODE = np.array([[1.0, 0.2, -0.1], [0.2, 1.5, 0.3], [-0.1, 0.3, 2.0]])
-
-
-def gigabytes(contacts: int, components: int = 3) -> float:
-    return 8 * (components * contacts) ** 2 / 1e9
 
 
 def angle(facets: int) -> float:
@@ -38,10 +32,6 @@ def stiffer(m: int, j: int) -> float:
     return float(symbol(m)[j] / symbol(m)[1])
 
 
-def peak(P: float) -> float:
-    return hertz_point(P, 400.0, contact_modulus(RUBBER)).peak
-
-
 @cache
 def node(law: laws.Law | float = 0.45) -> InterfaceProblem:
     return InterfaceProblem(NODE, [[-1.4, 1.2, -1.9]], law)
@@ -54,12 +44,6 @@ def moved(law: laws.Law | float = 0.45, factor: float = 1.0) -> np.ndarray:
 
 
 GRADED = {
-    "6.1": (
-        None,
-        (gigabytes(120 * 80, 1), "Each node has three components of force."),
-        (gigabytes(120 * 80) / 8, "A number takes 8 bytes."),
-        (gigabytes(120 * 80) / 1.024**3, "These are GiB, 1024^3 bytes. Asked are 10^9 bytes."),
-    ),
     "6.4": (
         lambda: Numbers(
             angle(8),

@@ -18,7 +18,7 @@ import numpy as np
 
 from contactopt import InterfaceProblem, laws, natural_map_residual, solve
 from contactopt.problem.certificate import Yardsticks, fit_multipliers, yardsticks
-from experiments.course.quantities import Numbers
+from experiments.course.quantities import MISSING, UNIT, Numbers
 from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, shortened, wrong
 
 HUGE = 1e100  # from here on numbers count as infinite
@@ -94,8 +94,7 @@ class Forces:
     def _unit(self, answer: np.ndarray) -> Verdict | None:
         for factor in (1e-6, 1e-3, 1e3, 1e6):
             if judge_forces(self.problem, self.forces(factor * answer)).right:
-                told = f"Your answer is {1 / factor:g} times the right one. Look at the units."
-                return wrong("unit", told)
+                return wrong("unit", UNIT.format(1 / factor))
         return None
 
 
@@ -236,8 +235,8 @@ def _others(problem: InterfaceProblem, r: np.ndarray) -> list[tuple[str, Any, np
             " against it.",
         ),
         ("pressure", problem, r * areas, "These are forces per area; forces are asked for."),
-        ("half", problem, 2 * r, "A factor of two is missing, or one too many."),
-        ("half", problem, r / 2, "A factor of two is missing, or one too many."),
+        ("half", problem, 2 * r, MISSING.format("two")),
+        ("half", problem, r / 2, MISSING.format("two")),
         ("order", problem, r[::-1], "These are the right forces in the reverse order."),
     ]
     if problem.dim == 3:

@@ -21,27 +21,28 @@ from experiments.course.mistakes import (
 )
 from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, shortened, wrong
 
-UNITS = (1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)
-# factors that no formula shows
-LOST = (
-    (2.0, "A factor of two is missing, or one too many."),
-    (0.5, "A factor of two is missing, or one too many."),
-    (np.pi, "A factor of pi is missing, or one too many."),
-    (1 / np.pi, "A factor of pi is missing, or one too many."),
-    (2 * np.pi, "A factor of 2 pi is missing, or one too many."),
-    (0.5 / np.pi, "A factor of 2 pi is missing, or one too many."),
-    (4.0, "A factor of four is missing, or one too many: look at squares and halves."),
-    (0.25, "A factor of four is missing, or one too many: look at squares and halves."),
-    (10.0, "The decimal point is in a wrong place."),
-    (0.1, "The decimal point is in a wrong place."),
-    (100.0, "Your answer is in percent, or the decimal point is in a wrong place."),
-    (0.01, "The decimal point is in a wrong place."),
-    (180 / np.pi, "Radians and degrees are mixed up."),
-    (np.pi / 180, "Radians and degrees are mixed up."),
-    (3.0, "A factor of three is missing, or one too many."),
-    (1 / 3, "A factor of three is missing, or one too many."),
-    (np.sqrt(2), "A factor of the square root of two is missing, or one too many."),
-    (np.sqrt(0.5), "A factor of the square root of two is missing, or one too many."),
+MISSING = "A factor of {} is missing, or one too many."
+UNIT = "Your answer is {:g} times the right one. Look at the units."
+# kind, factor that makes the answer right, and what is told; these come before the formula
+SCALED = (
+    ("sign", -1.0, "The size is right, the sign is not. Look at the arrows again."),
+    *(("unit", f, UNIT.format(1 / f)) for f in (1e-9, 1e-6, 1e-3, 1e3, 1e6, 1e9)),
+    *(("half", f, MISSING.format("two")) for f in (2.0, 0.5)),
+)
+# and these, which stand for their inverses too, after it
+LOST = tuple(
+    ("factor", f, told)
+    for factor, told in (
+        (np.pi, MISSING.format("pi")),
+        (2 * np.pi, MISSING.format("2 pi")),
+        (4.0, MISSING.format("four")),
+        (10.0, "The decimal point is in a wrong place."),
+        (100.0, "The decimal point is in a wrong place, or percent and shares are mixed up."),
+        (180 / np.pi, "Radians and degrees are mixed up."),
+        (3.0, MISSING.format("three")),
+        (np.sqrt(2), MISSING.format("the square root of two")),
+    )
+    for f in (factor, 1 / factor)
 )
 # functions of the right answer that somebody gives in its place
 ANGLE = "This is the angle, and its tangent is asked for."
@@ -137,17 +138,11 @@ class Numbers:
         right = float(np.ravel(self.value)[i])
         if self.counts and answer != round(answer):
             return wrong("count", "A count is a whole number.")
-        if self.agrees_alone(-answer, right):
-            return wrong("sign", "The size is right, the sign is not. Look at the arrows again.")
-        for factor in UNITS:
-            if self.agrees_alone(factor * answer, right):
-                told = f"Your answer is {1 / factor:g} times the right one. Look at the units."
-                return wrong("unit", told)
         if self.counts and abs(answer - right) == 1:
             return wrong("count", "It is one too many or one too few. Look at the ends again.")
-        for factor, told in LOST[:2]:
-            if self.agrees_alone(answer * factor, right):
-                return wrong("half", told)
+        for kind, factor, told in SCALED:
+            if self.agrees_alone(factor * answer, right):
+                return wrong(kind, told)
         return (
             self._from_formula(answer, i)
             or self._given(answer)
@@ -185,9 +180,9 @@ class Numbers:
 
     def _related(self, answer: float, right: float) -> Verdict | None:
         """Whether an answer is a factor or a function away from the right one."""
-        for factor, told in LOST[2:]:
-            if self.agrees_alone(answer * factor, right):
-                return wrong("factor", told)
+        for kind, factor, told in LOST:
+            if self.agrees_alone(factor * answer, right):
+                return wrong(kind, told)
         with np.errstate(all="ignore"):
             for function, told in RELATED:
                 if self.agrees_alone(answer, float(function(np.float64(right)))):
@@ -228,16 +223,9 @@ class Numbers:
     def _several(self, answer: np.ndarray, value: np.ndarray) -> Verdict:
         if value.size <= 5 and any(self.resembles(p, value) for p in permutations(answer)):
             return wrong("order", "These are the right numbers in a wrong order.")
-        if self.agrees(-answer, value):
-            return wrong(
-                "sign", "The sizes are right, the signs are not. Look at the arrows again."
-            )
-        for factor in (*UNITS, 0.5, 2.0):
+        for kind, factor, told in SCALED:
             if self.agrees(factor * answer, value):
-                if factor in (0.5, 2.0):
-                    return wrong("half", LOST[0][1])
-                told = f"Your answer is {1 / factor:g} times the right one. Look at the units."
-                return wrong("unit", told)
+                return wrong(kind, told)
         pairs = list(zip(answer.ravel(), value.ravel(), strict=True))
         good = [i + 1 for i, (a, b) in enumerate(pairs) if self._good(a, b, value)]
         head = f"Of your {value.size} numbers these are right: {good}. " if good else ""

@@ -1,8 +1,10 @@
-"""Arrows of the chapters' sketches."""
+"""Arrows and springs of the chapters' sketches."""
 
 from __future__ import annotations
 
 from typing import Any
+
+import numpy as np
 
 Point = tuple[float, float]
 
@@ -28,3 +30,11 @@ def arrow(
     if at is not None:
         place, offset, sides = at, (0.0, 0.0), {"ha": "left", "va": "baseline"}
     ax.annotate(name, place, offset, textcoords="offset points", color=color, size=13, **sides)
+
+
+def spring(ax: Any, tail: Point, head: Point) -> None:
+    """Draw a spring."""
+    way = np.subtract(head, tail)
+    side = 0.14 * np.array([-way[1], way[0]]) / np.hypot(*way)
+    zigzag = np.concatenate([[0], (-1.0) ** np.arange(11), [0]])[:, None]
+    ax.plot(*(tail + np.linspace(0, 1, 13)[:, None] * way + zigzag * side).T, "C0", lw=1.5)

@@ -4,7 +4,7 @@ A set is a TOML file. Its tables `[[problems]]` are those of an experiment file 
 besides: small (a good method needs less than 0.3 s), medium, large (more than 3 s). The JSON file
 of the same name beside it holds what was computed of each problem: its tags and its reference
 answer. Sets 1 and 2 are `set_1.toml` and `set_2.toml` here. Set 2 has sequences, whose `load` gives
-a contactopt.benchmark.sequences.Sequence. A set of yours names files of FCLib or of Siconos in one
+a contactopt.benchmark.sequences.Sequence. Your own set names files of FCLib or of Siconos in one
 line, `fclib = "folder/*.dat"`, or families of contactopt.benchmark.families.
 
     >>> from contactopt.benchmark import testset

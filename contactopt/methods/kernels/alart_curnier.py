@@ -17,6 +17,7 @@ from scipy.sparse.linalg import splu
 
 from contactopt.linear.operators import diagonal, form
 from contactopt.methods.constants import LOOSE
+from contactopt.methods.kernels.balance import LEAST_FELT
 from contactopt.methods.kernels.bonded import LEAST_PIVOT, Bonded, bonded
 from contactopt.methods.kernels.semismooth import (
     RIDGE,
@@ -33,7 +34,6 @@ from contactopt.problem import InterfaceProblem
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
 
 LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
-LEAST_FELT = 1e-8  # share of its motion that the glued contacts must feel of every multiplier
 
 
 def coulomb_equations(

@@ -18,7 +18,7 @@ from contactopt.methods.kernels.semismooth import Equations, Projection
 from contactopt.problem.cones import disc_derivative
 from contactopt.problem.laws.law import Law
 
-LEAST_FELT = 1e-8  # share of a motion that closed and sticking contacts must feel to hold it
+LEAST_FELT = 1e-8  # share of a motion that closed, sticking or glued contacts must feel to hold it
 DIRECT = 5  # steps of Newton's method that are tried without softened friction
 SURE = 1e-6  # error of the balance, over all friction bounds, with which a motion counts as found
 STEPS = 50  # of Newton's method

@@ -24,13 +24,13 @@ from math import sqrt
 import numpy as np
 
 from contactopt.methods import constants
+from contactopt.methods.kernels.semismooth import RIDGE
 from contactopt.methods.kernels.sparse_blocks import Blocks, Solver, bordered
 from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import coulomb_cone, lengths
 
 NEAR = 1e-9  # complementarity and residual at which it ends
-RIDGE = 1e-10  # added to the diagonal of the dimensionless Q, for directions without compliance
 TINY = 1e-20  # added to |u_t|^2, whose root has no derivative at zero
 BACKTRACKS = 30  # shortenings of a step, which leave a thousandth of it
 

@@ -16,12 +16,12 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from contactopt.defaults import ROUNDED
 from contactopt.methods.constants import SLIPPING
 from contactopt.methods.kernels.semismooth import Equations
 from contactopt.methods.preconditioners import Preconditioner
 
 RESTART, CYCLES = 60, 3  # of GMRES
-UNFELT = 1e-12  # share of the largest force that a motion makes, below which it makes none
 
 Act = Callable[[np.ndarray], np.ndarray]
 
@@ -125,7 +125,7 @@ class Linearised:
 
         shifts = (rho[:, None] * V).reshape(n // d, d, p)
         DrhoV = (self.D[np.any(self.D != 0, axis=(1, 2))] @ shifts).reshape(n, p)
-        border = Border(apply, DrhoV, V, UNFELT)
+        border = Border(apply, DrhoV, V, ROUNDED)
         return LinearOperator((n + p, n + p), matvec=lambda x: border.solve(x.ravel()), dtype=float)
 
 

@@ -28,14 +28,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contactopt.defaults import EQUAL
 from contactopt.linear.deadline import check_time
 from contactopt.linear.operators import has_entries
 from contactopt.problem import Infeasible, InterfaceProblem
+from contactopt.problem.feasibility import MARGIN
 
-ZERO = 1e-9  # of a dimensionless problem: what is smaller counts as zero
 PIVOT = 1e-8  # least pivot
 EXACT = 1e-10  # relative size of what rounding leaves of a zero in a contradiction
-MARGIN = 1e-7  # least constant of a contradiction, over the size of its terms
 BRANCH = 3e5  # entries that pivots change in the time that the rest of a branch takes
 FRESH = 50  # pivots after which a tableau is made anew from the data
 SAME = 1e-7  # relative size of what counts as zero when a point is given its states
@@ -223,7 +223,7 @@ class StateTree:
         wide = branch.arc[:, 1] - branch.arc[:, 0] > np.pi / 2 / 2**HALVED * 1.01
         slips = (mu > 0) & ((state <= SHUT) | ((state == SLIPPING) & wide))
         wrong = np.maximum(wrong, np.where(slips, np.minimum(speed, off), 0.0))
-        if wrong.max() <= ZERO:
+        if wrong.max() <= EQUAL:
             return []
         i, (low, high) = int(np.argmax(wrong)), branch.arc[int(np.argmax(wrong))]
         if state[i] == FREE:
@@ -266,7 +266,7 @@ class StateTree:
             right, fixed = branch.T[:, -1], branch.zero[branch.basic]
             wrong = np.where(fixed, np.abs(right), -right)
             wrong[doubtful[branch.basic]] = 0.0
-            rows = np.flatnonzero(wrong > ZERO)
+            rows = np.flatnonzero(wrong > EQUAL)
             if len(rows) == 0:
                 return True
             careful = branch.pivots > patience  # the least index cannot go round in a circle

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.methods.preconditioners.constants import CELL, EDGE
 from contactopt.problem import InterfaceProblem
@@ -15,7 +16,6 @@ from contactopt.problem.chart import nodal_weights
 
 GridMap = Callable[[np.ndarray], np.ndarray]  # linear map of arrays (*shape, dim)
 GridMaps = tuple[GridMap, GridMap | None]  # products with P and, where it is cheap, with P^-1
-EVEN = 1e-6  # relative difference of spacings that counts as none
 NO_GRID = (
     "the preconditioners need contact nodes on a line or a rectangular grid, 3 or more a side."
 )
@@ -59,7 +59,7 @@ def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndar
     ticks, places = [], []
     for row in x:
         order = np.argsort(row)
-        starts = np.concatenate([[True], np.diff(row[order]) > EVEN * size])
+        starts = np.concatenate([[True], np.diff(row[order]) > CLOSE * size])
         place = np.empty(len(row), dtype=int)
         place[order] = np.cumsum(starts) - 1
         ticks.append(row[order][starts])
@@ -141,7 +141,7 @@ def _turn(places: np.ndarray) -> np.ndarray:
     # Directions that differ by a quarter turn have the same fourth power as complex numbers.
     way = (step[:, 0] + 1j * step[:, 1]) / np.maximum(np.linalg.norm(step, axis=1), 1e-300)
     angle = np.angle(np.mean(way**4)) / 4
-    if abs(angle) <= EVEN:
+    if abs(angle) <= CLOSE:
         return np.eye(2)
     return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 

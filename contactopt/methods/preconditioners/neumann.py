@@ -18,8 +18,9 @@ import numpy as np
 import scipy.linalg as la
 from scipy.fft import dct, dst, fft, idct, idst
 
+from contactopt.defaults import CLOSE
 from contactopt.methods.preconditioners.constants import DISPERSION, SPLIT
-from contactopt.methods.preconditioners.grid import EVEN, Grid, GridMap, OnGrid, cells_along
+from contactopt.methods.preconditioners.grid import Grid, GridMap, OnGrid, cells_along
 
 # held at the (first, last) contact -> transform, its inverse, type, shift of the frequencies pi (j
 # + shift) / k
@@ -62,7 +63,7 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
     to, back, kind, shift = TRANSFORMS[bool(held[0]), bool(held[1])]
     k, steps = len(ticks), np.diff(ticks)
     waves = 4 * np.sin(np.pi * (np.arange(k) + shift) / (2 * k)) ** 2
-    if line or np.ptp(steps) <= EVEN * steps.mean():
+    if line or np.ptp(steps) <= CLOSE * steps.mean():
         forward, backward = (partial(act, type=kind, norm="ortho") for act in (to, back))
         squares = waves / steps.mean() ** 2
         return Direction(

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
-
-ALONG = 1e-6  # least part of a direction of friction that lies in the surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +38,7 @@ class Place:
                 f" {self.frames.shape[1]}."
             )
         along = self.frames[:, 1:] @ (np.array(self.direction) / np.linalg.norm(self.direction))
-        if np.any(np.linalg.norm(along, axis=1) < ALONG):
+        if np.any(np.linalg.norm(along, axis=1) < CLOSE):
             raise InputError(
                 "the direction of friction is normal to the surface at a contact; give one that"
                 " lies along the surface."

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.checks import check_name, check_size, real_array, short
+from contactopt.defaults import ROUNDED
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.loads.load import Face, Load
@@ -17,8 +18,8 @@ from contactopt.scenes.loads.traction import Traction
 
 if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
+    from contactopt.scenes.scene import Part
 
-ROUNDED = 1e-12  # of the force: a component that is zero but for rounding
 SLANTED = 1e-3  # cosine between a normal and a direction that lies in the face
 
 
@@ -166,3 +167,18 @@ def with_bolts(parts: Sequence[Any], bolts: Sequence[Bolt]) -> tuple[Any, ...]:
         return replace(part, loads=own + tuple(end for name, end in ends if name == part.name))
 
     return tuple(map(bolted, parts))
+
+
+def stiff_faces(ends: Mapping[str, Sequence[tuple[Part, BoltEnd]]], body: str) -> dict[str, str]:
+    """The bolts that keep faces of a body parallel, in words, by the plates that they are there;
+    from the ends of all bolts by their names.
+    """
+    found: dict[str, str] = {}
+    for name, both in ends.items():
+        for part, end in both:
+            if part.name == body and not end.tilting:
+                plate = f"plate '{end.boundary}'"
+                before = found.get(plate, "").partition(", whose")[0]
+                names = f"{before} and bolt '{name}'" if before else f"bolt '{name}'"
+                found[plate] = f"{names}, whose face {end.boundary!r} stays parallel,"
+    return found
