@@ -21,10 +21,13 @@ load adds g to the displacements at r = 0 [length] and l to the resultants [forc
    does, by far less than with the steepest push.
    It grows for ever where all forces grow with d: the cones and the laws are homogeneous, so that
    nothing but what stays, however small beside it, could end that.
+3. Trial. Forces of a body that locks itself balance any load, but need not arise. Where statics has
+   no positive lower end and the bodies do not rest without the load, the least factor at which the
+   problem is solved is found by halving.
 
-The push gives Coulomb's limit, and the upper end of statics is confirmed or corrected by it. The
-lower end, which a load has that presses the bodies together, stays a bound. The error is the
-difference between two meshes, of which the finer one has elements of half the size.
+The push gives Coulomb's limit, and the upper end of statics is confirmed or corrected by it. A
+lower end of statics, which a load has that presses the bodies together, stays a bound. The error is
+the difference between two meshes, of which the finer one has elements of half the size.
 
 Source: Drucker (1954), Coulomb friction, plasticity, and limit loads, J. Appl. Mech. 21, 71-74.
 """
@@ -34,7 +37,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy.linalg as la
@@ -68,6 +71,7 @@ WAYS = {
     "statics": "the largest one that forces in the friction cones balance, confirmed by a push",
     "bound": "a bound: forces in the friction cones balance no larger one",
     "below": "a bound: forces in the friction cones balance no smaller one",
+    "tried": "found by solving: below it forces that would hold the bodies do not arise",
     "push": "found by pushing the place of the load until its force no longer grew",
     "supports": "supports bear this load, whatever friction does",
 }
@@ -137,7 +141,7 @@ def limit_of(
     for mesh, (before, last) in enumerate(_meshes(held, states[-1]), 1):
         note(f"mesh {mesh} of 2: {last.name}")
         found.append(_on_mesh(before, last, note))
-    (coarse, _, _), (factor, interval, way) = found
+    coarse, (factor, interval, way, *_) = found[0].factor, found[-1]
     error = 0.0 if coarse == factor else abs(factor - coarse)
     words = _words(states[-1], load or "the last step", _force(held[-1], states[-1]), found)
     return Limit(factor, interval, error, way, words, (coarse, factor))
@@ -225,34 +229,50 @@ def _meshes(held: tuple[Scene, ...], last: Scene) -> Iterator[tuple[tuple[Scene,
         scenes = [finer(scene, None, shapes) for scene in scenes]
 
 
-Found = tuple[float, tuple[float, float] | None, str]  # factor, interval, way
+class Found(NamedTuple):
+    """The limit on one mesh: factor, interval and way as in Limit.
+
+    tried   whether the lower end was found by trial
+    closes  whether contacts that are open when the bodies slide away may stop them
+    """
+
+    factor: float
+    interval: tuple[float, float] | None
+    way: str
+    tried: bool = False
+    closes: bool = False
 
 
 def _on_mesh(held: tuple[Scene, ...], last: Scene, note: Note) -> Found:
     """The limit on one mesh."""
     options = Options(Q="explicit", note=note)
     slipped: np.ndarray | float = 0.0
+    rests = False
     try:
         path = follow_path(held, None, None, options)
-        reduction = path.reduction
-        if path.solved:
+        reduction, rests = path.reduction, path.solved
+        if rests:
             slipped = path.states[-1].displacements[:, 1:]
     except Unbalanced:  # without the load nothing rests
         reduction = reduce_bodies(held[-1], Q="explicit")
     base = reduction.loaded(held[-1])
     push = _Push.of(base, base.loaded(last))
     if push is None:
-        return np.inf, (-np.inf, np.inf), "supports"
+        return Found(np.inf, (-np.inf, np.inf), "supports")
     low, high = (push.end(largest) for largest in (False, True))
     if np.isnan(high):
-        return 0.0, None, "statics"
+        return Found(0.0, None, "statics")
     note(f"statics: {low:.6g} to {high:.6g}")
     found = push.force(slipped, note)
+    tried = low <= 0 and not rests
+    if tried:
+        low = push.least(min(1.0, found, high), note)
     if np.isnan(found) and np.isfinite(high):
-        return high, (low, high), "bound"
+        return Found(high, (low, high), "bound", tried)
     if found == high or abs(found - high) <= ALIKE * min(abs(high), abs(found)) + push.nothing:
-        return high, (low, high), "statics"
-    return found, (low, found), "push"
+        return Found(high, (low, high), "statics", tried)
+    closes = found < high and bool(push.problem.gaps.max() > 0)
+    return Found(found, (low, found), "push", tried, closes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,6 +319,30 @@ class _Push:
         found = float(made.variables["f"].value)
         return 0.0 if abs(found) <= 1e2 * self.nothing else found
 
+    def rests(self, f: float) -> bool:
+        """Whether the problem with f times the load is solved."""
+        old = self.problem
+        q = old.q + f * self.g.reshape(old.q.shape)
+        try:
+            return bool(solve(old.altered(q=q, s=old.s + f * self.load)).solved)
+        except Unbalanced:
+            return False
+
+    def least(self, upper: float, note: Note) -> float:
+        """The least positive f with a solution, by halving below one that has it; minus infinity
+        if none is found.
+        """
+        tried = (upper * 0.999**power for power in (1, 100, 1000))
+        high = next((f for f in tried if self.rests(f)), 0.0)
+        if high == 0.0:
+            return -np.inf
+        low = 0.0
+        while high - low > ALIKE / 10 * high and high > self.nothing:
+            middle = (low + high) / 2
+            low, high = (low, middle) if self.rests(middle) else (middle, high)
+            note(f"trial: {low:.6g} to {high:.6g}")
+        return high if low > 0 else -np.inf
+
     def force(self, slipped: np.ndarray | float, note: Note) -> float:
         """The largest f: infinite if it grows for ever, not a number if a push is not solved."""
         old, size = self.problem, float(np.linalg.norm(self.load))
@@ -339,7 +383,7 @@ class _Push:
 
 def _words(scene: Scene, load: str, force: float | None, found: list[Found]) -> str:
     """The answer in a few sentences: both ends, whether 1 lies between them, whence they come."""
-    factor, interval, way = found[-1]
+    factor, interval, way, tried, closes = found[-1]
     if interval is None:
         return f"{scene.name}: the bodies {AWAY}, whatever the factor on {load} is."
     low, high = interval
@@ -350,6 +394,7 @@ def _words(scene: Scene, load: str, force: float | None, found: list[Found]) -> 
         which = "factor" if way == "supports" else "positive factor"
         return f"{scene.name}: no {which} on {load} makes the bodies {AWAY}: {why}."
     given = "friction can hold them" if low <= 1 <= high else "they do"
+    given += ", unless contacts that are open now stop them" if closes and high < 1 else ""
     if np.abs(np.array(interval) - 1).min() <= STEADY:
         given = "they are at the limit"
     below = f"below {low:.5g} times "
@@ -359,7 +404,8 @@ def _words(scene: Scene, load: str, force: float | None, found: list[Found]) -> 
         also = f" The bodies {AWAY} {below}it{at_one}." if low > 0 else ""
         return f"{unknown} says which.{also}"
     total = "" if force is None else f" ({factor * force:.5g} {force_unit(scene.units)})"
-    sources = [f"the lower end is {WAYS['below']}"] if np.isfinite(low) else []
+    below_by = WAYS["tried" if tried else "below"]
+    sources = [f"the lower end is {below_by}"] if np.isfinite(low) else []
     if factor == np.inf:
         ends = f"{below}{load}, and at no larger factor: {why}"
     else:
@@ -375,7 +421,7 @@ def _words(scene: Scene, load: str, force: float | None, found: list[Found]) -> 
 
 def _apart(found: list[Found]) -> str:
     """By how much the ends on two meshes differ, in words."""
-    (_, coarse, _), (_, fine, _) = found
+    coarse, fine = found[0].interval, found[-1].interval
     ends = [(a, b) for a, b in zip(coarse or (np.nan, np.nan), fine or ()) if np.isfinite(b)]
     most = np.max([abs(a - b) / abs(b) if b else np.inf for a, b in ends if a != b], initial=0.0)
     if not np.isfinite(most):

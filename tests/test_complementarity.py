@@ -417,3 +417,29 @@ def test_a_normal_force_that_moves_nothing_still_bounds_friction():
         except InputError:  # nothing can balance the load
             assert counts[-1] == 0, seed
     assert min(counts) == 0 and max(counts) > 1
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        InterfaceProblem(
+            np.zeros((4, 4)),
+            [[-2.0, -1], [0, 2]],
+            [1.0, 0.5],
+            V=[[1.0, 1], [-1, -1], [-1, 0], [-1, -1]],
+            s=[0.0, 0],
+        ),
+        InterfaceProblem(
+            np.outer([-1.0, 1, 2, 0], [-1.0, 1, 2, 0]),
+            [[-1.0, 2], [0, 1]],
+            [0.5, 1],
+            V=[[-1.0], [-1], [-1], [1]],
+            s=[0.0],
+        ),
+    ],
+)
+def test_no_forces_are_a_solution_though_the_motion_is_rounded(problem):
+    (found,) = all_solutions(problem)
+    assert np.abs(found.reactions).max() < 1e-14 and solve(problem).solved
+    lam = found.multipliers * (1 + 1e-15)
+    assert natural_map_residual(problem, 0 * found.reactions, lam) < 1e-14

@@ -253,6 +253,31 @@ def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, fact
     assert found.factor == pytest.approx(factor, rel=1e-4) and said in str(found), found
 
 
+def test_a_wedge_that_locks_itself_rests_only_where_its_forces_arise():
+    """Forces in the cones balance any pull on it, but it lifts off where the pull exceeds the push
+    on its top: below .15 times the push.
+    """
+    mesh = quadrilateral([(-0.5, 0), (0.5, 0), (1, 1), (-1, 1)], {}, (4, 2))
+    loads = Traction("top", (0.0, -0.5)), BodyForce((0.0, 0.1))
+    body = Part("wedge", mesh, Material(1000.0, 0.3), loads=loads)
+    pairs = Contact("wedge:left", "a", 0.7), Contact("wedge:right", "b", 0.7)
+    scene = Scene("locked", bodies=(body, Rigid("a"), Rigid("b")), contacts=pairs)
+    found = limit(scene, "wedge:top:y")
+    assert found.factor == np.inf and 0.13 < found.interval[0] <= 0.15
+    assert "found by solving" in str(found)
+
+
+def test_contacts_that_are_open_may_stop_a_body_that_slides():
+    mesh = quadrilateral([(0, 0), (2, 0), (2, 1), (0, 1)], {}, (4, 2))
+    loads = BodyForce((0.0, -1.0)), Traction("left", (1.0, 0.0))
+    body = Part("block", mesh, Material(1000.0, 0.3), loads=loads)
+    wall = Rigid("wall", gap=lambda x: 0.01 + 0 * x[0])
+    pairs = Contact("block:bottom", "floor", 0.3), Contact("block:right", "wall", 0.0)
+    found = limit(Scene("stop", bodies=(body, Rigid("floor"), wall), contacts=pairs), "block:left")
+    assert found.factor == pytest.approx(0.6, rel=1e-4)
+    assert "unless contacts that are open now stop them" in str(found)
+
+
 def test_associated_friction_holds_more_than_that_of_coulomb():
     """A block between two walls: it jams where slip dilates, and slides where it does not."""
     mesh = quadrilateral([(0, 0), (2, 0), (2, 1), (0, 1)], {})

@@ -7,6 +7,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+import skfem
 from conftest import MATERIAL, two_blocks
 from mortar_scenes import couple, press_fit, resultants, ring, slab
 from skfem.quadrature import get_quadrature
@@ -16,6 +17,7 @@ from contactopt import (
     InputError,
     Material,
     Plate,
+    Pressure,
     Support,
     reduce,
     reduce_bodies,
@@ -755,3 +757,38 @@ def test_mortar_is_chosen_where_nodes_do_not_match(caplog):
     long = replace(finer, upper=None, lower=None, mu=None, bodies=finer.parts, contacts=(coarse,))
     assert reduce_bodies(long).coupling.carrier == "upper"
     assert reduce(long).contacts < problem.contacts
+
+
+@pytest.mark.parametrize("carrier", [None, "lower"])
+def test_contacts_on_a_held_edge_are_no_more_than_the_other_side_can_tell_apart(carrier):
+    """A plate that is clamped at its edge, and finer than the other one: carried by its own nodes,
+    pressures on that edge alternate.
+    """
+
+    def plate(x, y, z):
+        mesh = skfem.MeshHex.init_tensor(*(np.array(v, float) for v in (x, y, z)))
+        return mesh.with_boundaries(
+            {
+                "x-": lambda p: p[0] == x[0],
+                "z-": lambda p: p[2] == z[0],
+                "z+": lambda p: p[2] == z[-1],
+            }
+        )
+
+    steel = Material(200.0, 0.3)
+    upper = plate(np.linspace(0, 4, 5), np.linspace(-2, 2, 5), [0, 0.5, 1])
+    lower = plate(np.linspace(0, 4, 4), np.linspace(-2, 2, 7), [-1, -0.5, 0])
+    held = Support("x-"), Support("z-", {"z": 0.0})
+    parts = (
+        Part("upper", upper, steel, loads=(Pressure("z+", 0.5),), contact="z-"),
+        Part("lower", lower, steel, held, contact="z+"),
+    )
+    pair = Contact("upper", "lower", 0.0, law="frictionless", carrier=carrier)
+    scene = Scene("plates", bodies=parts, contacts=(pair,), kind="solid", degree=1)
+    made = reduce_bodies(scene)
+    solution = solve(made.problem)
+    p = solution.reactions[:, 0] / made.problem.areas
+    assert solution.solved
+    assert (np.ptp(p[np.isclose(made.problem.coordinates[0], 0)]) < 0.02) == (carrier is None)
+    said = " ".join(remarks(made, solution))
+    assert ("may alternate" in said) == (carrier == "lower")

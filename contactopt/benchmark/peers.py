@@ -88,6 +88,10 @@ class Answer:
     measured: dict[str, float] = field(default_factory=dict)
 
 
+class PeerAnswer(Answer):
+    """An answer from a process of its own, whose measurements are believed: no other's are."""
+
+
 @dataclass
 class Peer:
     """A solver in the first of several Pythons that can import it.
@@ -158,7 +162,7 @@ class Peer:
             return Answer("error", reply["error"])
         status = Status.SOLVED if reply["claimed"] else Status.SETTLED
         r = np.array(reply["reactions"]).reshape(p.q.shape)[:, : problem.dim]
-        return Answer(
+        return PeerAnswer(
             status.label,
             reactions=scales.to_physical(r, problem.s)[0],
             iterations=reply["iterations"],

@@ -188,8 +188,8 @@ class Shares:
 class History:
     """What earlier runs say of later ones.
 
-    A run that took longer than LONG, or was refused, is not repeated. Where one was ended at its
-    limit of time, so would be those of tighter tolerances, which are not made.
+    A run that took longer than LONG, was refused or ended at its limit of time is not repeated. At
+    tighter tolerances a limit of time would end it too, so that these runs are not made.
     """
 
     def __init__(self, rows: Iterable[Mapping[str, Any]] = ()):
@@ -202,9 +202,10 @@ class History:
         """Take a row into account."""
         key = row["problem"], row["method"]
         long = row["cpu_seconds"] > LONG or row["call_seconds"] > LONG_WAIT
-        if long or row["status"] == "refused":
+        late = row["status"] in ("time_limit", "killed")
+        if long or late or row["status"] == "refused":
             self.once.add((*key, row["setting"]))
-        if row["status"] in ("time_limit", "killed"):
+        if late:
             self.ended[key] = max(row["tolerance"], self.ended.get(key, 0.0))
 
     def repeated(self, run: Run) -> bool:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.benchmark.measure import Task
-from contactopt.benchmark.peers import Answer
+from contactopt.benchmark.peers import Answer, PeerAnswer
 from contactopt.benchmark.plugins import PASSED, Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
@@ -254,8 +254,10 @@ def _call(task: Task) -> Call:
 
 def _read(answer: object, label: str) -> Answer:
     """What a plug-in's function returned, in whatever form."""
-    if isinstance(answer, Answer):
+    if isinstance(answer, PeerAnswer):
         return replace(answer, label=label)
+    if isinstance(answer, Answer):
+        return replace(answer, label=label, measured={})
     if isinstance(answer, Solution):
         return _of_solution(answer, label)
     reactions, multipliers = answer if isinstance(answer, tuple) else (answer, None)

@@ -74,7 +74,7 @@ class Coupling:
     why           why surfaces are coupled in this way; empty where this way was asked for
     tight         (k,) contacts of a tie at which others join its bodies, too, and which it could
                   not give up (contactopt.coupling.crosspoints); None: nowhere
-    thin          a sentence for the reader on a thin body that bulges between contacts, or empty
+    doubt         a sentence for the reader where the carrier does not suit the bodies, or empty
     fails         a sentence for the reader where the coupling fails the patch test, or empty
     """
 
@@ -93,13 +93,13 @@ class Coupling:
     conforming: bool = False
     why: str = ""
     tight: np.ndarray | None = None
-    thin: str = ""
+    doubt: str = ""
     fails: str = ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """Sentences for the reader on what this coupling cannot do well."""
-        return tuple(text for text in (self.thin, self.fails) if text)
+        return tuple(text for text in (self.doubt, self.fails) if text)
 
 
 def couple(

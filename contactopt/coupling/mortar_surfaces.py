@@ -23,6 +23,11 @@ from contactopt.scenes.scene import Scene
 
 # contacts for each node of a thin body, below which displacements of its surface move none of them
 FEWEST = 0.95
+# A support holds a node along the normal if it holds all components of it above the first number.
+# Displacements move contacts apart from each other if the singular value is above the second one
+# times the largest.
+ACROSS, APART = 1e-3, 0.1
+MOST_HELD = 1000  # contacts at held nodes up to which these singular values are computed
 
 log = logging.getLogger(__name__)
 
@@ -36,7 +41,9 @@ def couple_surfaces(
 
     The contacts are carried by the side that the pair names. Otherwise it is the one with more
     contacts where they face each other, unless a thin body on the other side has more nodes there
-    than contacts: the thin one carries them then (contactopt.bodies.thickness).
+    than contacts: the thin one carries them then (contactopt.bodies.thickness). The other side does
+    so, too, where supports hold nodes of the carrier, and the other side has fewer nodes there than
+    contacts: its displacements alone could not tell their forces apart.
     """
     bodies = upper, lower
     meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]
@@ -85,7 +92,15 @@ def couple_surfaces(
             f" {loose:.2g} contacts for each of its nodes, so that it can bulge between them; take"
             f" carrier = '{other}', or a finer mesh of the {side} body."
         )
-        return replace(made, thin=said)
+        return replace(made, doubt=said)
+    if crowded := _crowded(m, meshes):
+        said = (
+            f"contact '{pair.name}': supports hold the {side} body '{carrier.name}' at contacts of"
+            f" which the other body's nodes can tell {crowded} too few apart, so that their forces"
+            f" may alternate; take carrier = '{SIDES[1 - m.own]}', or a finer mesh of the other"
+            " body."
+        )
+        return replace(made, doubt=said)
     return made
 
 
@@ -97,7 +112,30 @@ def _carried(sides: list[Faces], meshes: list[Mesh], carrier: str | None) -> tup
         turned = mortar(sides[0], sides[1], SIDES[1 - made.own])
         if (other := _per_node(turned, sides, meshes)) > loose:
             return turned, other
+    elif carrier is None and _crowded(made, meshes):
+        turned = mortar(sides[0], sides[1], SIDES[1 - made.own])
+        if not _crowded(turned, meshes) and (other := _per_node(turned, sides, meshes)) >= FEWEST:
+            return turned, other
     return made, loose
+
+
+def _crowded(made: Mortar, meshes: list[Mesh]) -> int:
+    """How many of the contacts that a support of their own side holds along the normal are more
+    than displacements of the other side can move independently.
+    """
+    own, other = meshes[made.own], meshes[1 - made.own]
+    normal = np.abs(made.normals) > ACROSS
+    still = np.all(own.held[:, made.nodes] | ~normal, axis=0)
+    if not 0 < still.sum() <= MOST_HELD:
+        return 0
+    W = made.weights[1 - made.own][np.flatnonzero(still)]
+    W = W[:, np.flatnonzero(~other.held.all(axis=0))]
+    W = W[np.diff(W.indptr) > 0]  # contacts that both sides hold are none
+    if not W.shape[0]:
+        return 0
+    W = W[:, np.unique(W.indices)].toarray()
+    values = np.linalg.svd(W, compute_uv=False)
+    return int(W.shape[0] - np.sum(values > APART * values[0]))
 
 
 def _per_node(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> float:

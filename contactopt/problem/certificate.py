@@ -70,7 +70,9 @@ DUST = 1e-5  # share of the force that closes the gaps below which forces are ro
 UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
 # rounding of r - rho u, over r, and how many times F the forces are from where on it counts
 ROUNDING, UNSEEN = 2.0**-52, 1e4
-CANCELLED = 4 * ROUNDING  # share of a gap, up to which what a motion leaves of it is none
+# share of a gap, or of a motion, up to which what a motion leaves of a gap is none: a motion is
+# known to the rounding of some equations
+CANCELLED = 16 * ROUNDING
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
@@ -136,7 +138,8 @@ def natural_map_residual(
     w = problem.q
     if len(lam):
         w = w + (problem.V @ lam).reshape(r.shape)
-        w[np.abs(w) <= CANCELLED * np.abs(problem.q)] = 0.0
+        sizes = np.maximum(np.abs(problem.q), _motion(problem, lam))
+        w[np.abs(w) <= CANCELLED * sizes] = 0.0
     u = d + w
     measure = yardsticks(problem, r, d, w)
     beyond = lengths(r[:, 1:]) - problem.law.bound_along(r)
@@ -183,6 +186,15 @@ def yardsticks(
         return Yardsticks(force, 0.0, np.zeros(len(r)))
     stiff = np.minimum(np.maximum(mean * problem.stiffnesses, 1.0), STIFFEST)
     return Yardsticks(force, length, stiff * (force / length))
+
+
+def _motion(problem: InterfaceProblem, lam: np.ndarray) -> np.ndarray:
+    """(k, dim) how far the motions move a component, if each is as large as the largest of them
+    [length]: `lam` is known to the rounding of that.
+    """
+    largest = float(np.max(problem.reach * np.abs(lam)))
+    share = np.divide(1.0, problem.reach, out=np.zeros(len(lam)), where=problem.reach > 0)
+    return np.asarray(largest * (np.abs(problem.V) @ share).reshape(problem.q.shape))
 
 
 def _plate_force(problem: InterfaceProblem) -> float:
