@@ -24,7 +24,7 @@ from contactopt.problem.scaling import immovable
 # thousandth within three elements.
 NEAREST = 40
 # The places along an edge in space exchange forces with each other and over more contacts than
-# these. With so few contacts all are looked at at once, which takes 0.2 s.
+# these. With so few contacts all are looked at at once, in a fraction of a second.
 FEW = 200
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6

@@ -16,9 +16,8 @@ from contactopt.readings.resultants import views
 # elements across the half-width of contact; with so few the largest pressure is some percent off
 # (reports/accuracy)
 FEWEST = 4
-# of the median traction, between neighbours on a tie that is joined more than once: one with a mesh
-# of one or two elements jumps by up to 0.6 where it is right (the smooth fields of a coarse mesh),
-# by 2 or more where forces alternate
+# of the median traction, between neighbours on a tie that is joined more than once: right forces on
+# a few coarse seams jumped by about 0.3, and alternating ones by 2 and more
 JUMP = 1.0
 APART = 0.05  # relative difference of two readings of the largest pressure that is told
 
