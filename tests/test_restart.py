@@ -116,10 +116,10 @@ def test_what_does_not_fit_is_told(tmp_path, whole):
     with pytest.raises(InputError, match=f"holds no {FILE}"):
         contactopt.run("punch-2d", start=tmp_path)
     (tmp_path / FILE).write_bytes(b"no archive")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is damaged"):
         contactopt.run("punch-2d", start=tmp_path)
     np.savez(tmp_path / FILE, names=np.array(["a"]))
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is damaged"):
         contactopt.run("punch-2d", start=tmp_path)
     with pytest.raises(InputError, match="give the folder"):
         contactopt.run("punch-2d", resume=True)

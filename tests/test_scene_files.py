@@ -285,7 +285,7 @@ MISTAKES = [
         'contact = "y-"',
         'contact = "y-"\nsupports = [{ boundary = "x-" }]',
         4,
-        "body 'block': the plate on 'y\\+' moves",
+        "body 'block': the plate 'y\\+' moves",
     ),
     ("block = { x = [0, 2], y", "move = { x = 1e16 }\nblock = { x = [0, 2], y", 5, "moved so far"),
     ("[solve]", "[solv]", 20, "there is no 'solv'"),
