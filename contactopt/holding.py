@@ -264,9 +264,10 @@ def _on_mesh(held: tuple[Scene, ...], last: Scene, note: Note) -> Found:
         return Found(0.0, None, "statics")
     note(f"statics: {low:.6g} to {high:.6g}")
     found = push.force(slipped, note)
-    tried = low <= 0 and not rests
-    if tried:
-        low = push.least(min(1.0, found, high), note)
+    tried = False
+    if low <= 0 < high and not rests:
+        least = push.least(min(1.0, found, high), note)
+        tried, low = bool(least > low), max(low, least)
     if np.isnan(found) and np.isfinite(high):
         return Found(high, (low, high), "bound", tried)
     if found == high or abs(found - high) <= ALIKE * min(abs(high), abs(found)) + push.nothing:
@@ -332,11 +333,8 @@ class _Push:
         """The least positive f with a solution, by halving below one that has it; minus infinity
         if none is found.
         """
-        tried = (upper * 0.999**power for power in (1, 100, 1000))
-        high = next((f for f in tried if self.rests(f)), 0.0)
-        if high == 0.0:
-            return -np.inf
-        low = 0.0
+        first = (upper * share for share in (0.999, 0.9, 0.4))
+        low, high = 0.0, next((f for f in first if self.rests(f)), 0.0)
         while high - low > ALIKE / 10 * high and high > self.nothing:
             middle = (low + high) / 2
             low, high = (low, middle) if self.rests(middle) else (middle, high)

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import skfem
 from scipy.integrate import dblquad, quad
 
 import contactopt
@@ -14,6 +15,7 @@ from contactopt import (
     InputError,
     Material,
     Part,
+    Plate,
     Rigid,
     Scene,
     Support,
@@ -453,6 +455,31 @@ def test_half_space_meets_finite_elements():
     assert mixed.solved and pure.solved
     assert mixed.reactions[:, 0].sum() == pytest.approx(0.3)
     assert np.abs(mixed.reactions - pure.reactions).max() < 0.05 * pure.reactions.max()
+
+
+def test_a_mesh_on_a_half_space_is_the_same_scene_turned_upside_down():
+    """The cells of the half-space reach beyond the mesh, whose areas count."""
+    x = np.linspace(0, 1.75, 8)
+
+    def block(y, loads=(), supports=(), contact="low"):
+        mesh = skfem.MeshQuad.init_tensor(x, y).with_boundaries(
+            {"low": lambda p: p[1] == y[0], "top": lambda p: p[1] == y[-1]}
+        )
+        return Part("block", mesh, Material(1000.0, 0.3), supports, loads, contact)
+
+    ground, y = Material(200.0, 0.25), np.linspace(0, 1, 5)
+    found = []
+    for upper, lower in (
+        (block(y, (Plate("top", {"y": -1.0, "x": 0.1}),)), HalfSpace("half", ground, x)),
+        (
+            HalfSpace("half", ground, x, force={"y": -1.0, "x": -0.1}),
+            block(y - 1, (), (Support("low"),), "top"),
+        ),
+    ):
+        problem = contactopt.reduce(Scene("s", upper, lower, 0.4))
+        found.append((problem.areas, contactopt.solve(problem, tol=1e-11).reactions[:, 0]))
+    assert found[0][0].sum() == pytest.approx(1.75)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-6)
 
 
 def test_periodic_wavy_surface_is_westergaards():

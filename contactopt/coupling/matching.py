@@ -38,13 +38,15 @@ def couple_nodes(
     """The coupling whose contacts are the contact nodes of the lower body, or of the upper one if
     that alone has a mesh. InputError if the contact nodes of two bodies do not match.
 
-    Frames and areas are those of the body that the contacts belong to. The contacts are numbered
-    along the chart.
+    Frames and areas are those of the body that the contacts belong to, but for areas on a
+    half-space that a mesh faces. The contacts are numbered along the chart.
     """
     names, conforming = pair.surfaces, True
     if upper.meshed and lower.meshed:
         first, second = upper.surface(names[0]), lower.surface(names[1])
         lead, partner = second, _match(first, second)
+        if second.mesh is None and first.mesh is not None:  # cells of a half-space reach beyond it
+            lead = replace(second, areas=first.areas[partner])
         normals, gap = lead.normals, 0 * lead.areas
         conforming = _conforming(lead.cells, first.cells, partner)
     else:

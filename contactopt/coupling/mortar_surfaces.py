@@ -48,19 +48,15 @@ def couple_surfaces(
     bodies = upper, lower
     meshes = [_mesh(body.surface(name)) for body, name in zip(bodies, pair.surfaces)]
     sides = _halved([_faces(body.name, mesh) for body, mesh in zip(bodies, meshes)], meshes)
-    m, loose = _carried(sides, meshes, pair.carrier)
+    m, loose, crowded = _carried(sides, meshes, pair.carrier)
     one = _whole_where_even(sides[m.own], m.nodes, m.normals)
     if one is not sides[m.own]:
         sides[m.own] = one
-        m, loose = _carried(sides, meshes, SIDES[m.own])
+        m, loose, crowded = _carried(sides, meshes, SIDES[m.own])
     carrier, mine, theirs = sides[m.own], meshes[m.own], meshes[1 - m.own]
     # A component is held at a contact where supports hold it on both sides; the other side is held
-    # as well where a plane of symmetry of both cuts it. A contact that moved to where the other
-    # surface ends is no more at its node, which a support may hold.
-    moved = np.linalg.norm(m.points - carrier.points[:, m.nodes], axis=0)
-    own_held = mine.held[:, m.nodes] & (moved <= EQUAL * np.ptp(m.points, axis=1).max())
-    if carrier.mirror is not None:
-        own_held |= mine.held[:, m.nodes] & carrier.mirror[:, m.nodes]
+    # as well where a plane of symmetry of both cuts it.
+    own_held = _held(m, carrier, mine)
     other_held = np.stack([m.alone[1 - m.own] @ ~row == 0 for row in theirs.held])
     if carrier.mirror is not None:
         other_held |= carrier.mirror[:, m.nodes]
@@ -93,7 +89,7 @@ def couple_surfaces(
             f" carrier = '{other}', or a finer mesh of the {side} body."
         )
         return replace(made, doubt=said)
-    if crowded := _crowded(m, meshes):
+    if crowded:
         said = (
             f"contact '{pair.name}': supports hold the {side} body '{carrier.name}' at contacts of"
             f" which the other body's nodes can tell {crowded} too few apart, so that their forces"
@@ -104,28 +100,43 @@ def couple_surfaces(
     return made
 
 
-def _carried(sides: list[Faces], meshes: list[Mesh], carrier: str | None) -> tuple[Mortar, float]:
-    """The contacts, and how many of them there are for each node of a thin other side."""
+def _carried(
+    sides: list[Faces], meshes: list[Mesh], carrier: str | None
+) -> tuple[Mortar, float, int]:
+    """The contacts; how many of them there are for each node of a thin other side; and how many
+    are too many on held nodes.
+    """
+
+    def suits(made: Mortar) -> tuple[float, int]:
+        return _per_node(made, sides, meshes), _crowded(made, sides, meshes)
+
     made = mortar(sides[0], sides[1], carrier)
-    loose = _per_node(made, sides, meshes)
-    if carrier is None and loose < FEWEST:
+    loose, crowded = suits(made)
+    if carrier is None and (loose < FEWEST or crowded):
         turned = mortar(sides[0], sides[1], SIDES[1 - made.own])
-        if (other := _per_node(turned, sides, meshes)) > loose:
-            return turned, other
-    elif carrier is None and _crowded(made, meshes):
-        turned = mortar(sides[0], sides[1], SIDES[1 - made.own])
-        if not _crowded(turned, meshes) and (other := _per_node(turned, sides, meshes)) >= FEWEST:
-            return turned, other
-    return made, loose
+        other, left = suits(turned)
+        if other > loose if loose < FEWEST else other >= FEWEST and left < crowded:
+            return turned, other, left
+    return made, loose, crowded
 
 
-def _crowded(made: Mortar, meshes: list[Mesh]) -> int:
+def _held(made: Mortar, carrier: Faces, mesh: Mesh) -> np.ndarray:
+    """(dim, k) the components that a support of their own side holds at the contacts. One that
+    moved to where the other surface ends is no more at its node, which a support may hold.
+    """
+    held, at = mesh.held[:, made.nodes], carrier.points[:, made.nodes]
+    moved = np.linalg.norm(made.points - at, axis=0) > EQUAL * np.ptp(made.points, axis=1).max()
+    if carrier.mirror is None:
+        return held & ~moved
+    return held & (~moved | carrier.mirror[:, made.nodes])
+
+
+def _crowded(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> int:
     """How many of the contacts that a support of their own side holds along the normal are more
     than displacements of the other side can move independently.
     """
-    own, other = meshes[made.own], meshes[1 - made.own]
-    normal = np.abs(made.normals) > ACROSS
-    still = np.all(own.held[:, made.nodes] | ~normal, axis=0)
+    held, other = _held(made, sides[made.own], meshes[made.own]), meshes[1 - made.own]
+    still = np.all(held | (np.abs(made.normals) <= ACROSS), axis=0)
     if not 0 < still.sum() <= MOST_HELD:
         return 0
     W = made.weights[1 - made.own][np.flatnonzero(still)]

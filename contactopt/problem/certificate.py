@@ -70,8 +70,8 @@ DUST = 1e-5  # share of the force that closes the gaps below which forces are ro
 UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
 # rounding of r - rho u, over r, and how many times F the forces are from where on it counts
 ROUNDING, UNSEEN = 2.0**-52, 1e4
-# share of a gap, or of a motion, up to which what a motion leaves of a gap is none: a motion is
-# known to the rounding of some equations
+# share of a gap, or of the largest motion, up to which what motions leave of a gap is none: they
+# are known to the rounding of the few equations that give them
 CANCELLED = 16 * ROUNDING
 STIFFEST = 1e4  # largest rho_i, over the mean one
 
@@ -137,8 +137,10 @@ def natural_map_residual(
     d = np.asarray(problem.Q @ r.ravel() if moved is None else moved.value).reshape(r.shape)
     w = problem.q
     if len(lam):
-        w = w + (problem.V @ lam).reshape(r.shape)
-        sizes = np.maximum(np.abs(problem.q), _motion(problem, lam))
+        moved_by = (problem.V @ lam).reshape(r.shape)
+        w = w + moved_by
+        largest = float(np.max(problem.reach * np.abs(lam)))
+        sizes = np.maximum(np.abs(problem.q), np.where(moved_by != 0, largest, 0.0))
         w[np.abs(w) <= CANCELLED * sizes] = 0.0
     u = d + w
     measure = yardsticks(problem, r, d, w)
@@ -186,15 +188,6 @@ def yardsticks(
         return Yardsticks(force, 0.0, np.zeros(len(r)))
     stiff = np.minimum(np.maximum(mean * problem.stiffnesses, 1.0), STIFFEST)
     return Yardsticks(force, length, stiff * (force / length))
-
-
-def _motion(problem: InterfaceProblem, lam: np.ndarray) -> np.ndarray:
-    """(k, dim) how far the motions move a component, if each is as large as the largest of them
-    [length]: `lam` is known to the rounding of that.
-    """
-    largest = float(np.max(problem.reach * np.abs(lam)))
-    share = np.divide(1.0, problem.reach, out=np.zeros(len(lam)), where=problem.reach > 0)
-    return np.asarray(largest * (np.abs(problem.V) @ share).reshape(problem.q.shape))
 
 
 def _plate_force(problem: InterfaceProblem) -> float:

@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 from contactopt.bodies.views import elements_of
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import EQUAL
 from contactopt.meshes.cells import facet_nodes
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
@@ -24,7 +25,6 @@ from contactopt.scenes.scene import Part
 
 # distances between contacts, beyond the gap, up to which a node of a body belongs to a contact
 NEAR = 1.5
-AT = 1e-9  # of the size of a surface, within which a contact lies at a node
 STATUS = ("open", "stick", "slip")
 CELLS = {2: "line", 3: "triangle", 4: "quad"}  # by their corners
 
@@ -151,7 +151,7 @@ def _nodes(reduction: Reduction, name: str, places: np.ndarray) -> dict[str, np.
     """The nodes of both bodies of a pair at these places (dim, k), by the names of the bodies."""
     scene, found = reduction.scene, dict[str, np.ndarray]()
     (pair,) = (own for own in scene.pairs if own.name == name)
-    near = AT * (float(np.ptp(places, axis=1).max(initial=0.0)) or 1.0)
+    near = EQUAL * (float(np.ptp(places, axis=1).max(initial=0.0)) or 1.0)
     for part, body in zip(scene.parts, reduction.bodies):
         elements = elements_of(body)
         if part.name not in pair.bodies or elements is None or not isinstance(part, Part):
