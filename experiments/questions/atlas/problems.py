@@ -179,11 +179,11 @@ class End:
 
     @property
     def what(self) -> str:
-        """What it does: cycle, stall, crawl, wander, break down, false claim."""
+        """What it does: cycle, stall, crawl, wander, break down, claim falsely."""
         if not self.failed:
             return "solves"
         if self.status in ("solved",):
-            return "false claim"
+            return "claims falsely"
         if self.status in ("backend_failed", "diverged", "settled", "error"):
             return "breaks down"
         if self.status == "stalled":
