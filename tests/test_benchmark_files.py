@@ -102,9 +102,13 @@ def test_ctrl_c_while_files_are_moved_leaves_all_or_none(step, tmp_path, monkeyp
 
     monkeypatch.setattr(step, interrupted)
     out = tmp_path / "new" / "out"
-    with pytest.raises(KeyboardInterrupt), whole_folder(out) as folder:
-        (folder / "a").write_text("1")
-        (folder / "b").write_text("2")
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in the background
+    try:
+        with pytest.raises(KeyboardInterrupt), whole_folder(out) as folder:
+            (folder / "a").write_text("1")
+            (folder / "b").write_text("2")
+    finally:
+        signal.signal(signal.SIGINT, before)
     if step == "tempfile.mkdtemp":
         assert not out.parent.exists()
     else:

@@ -173,7 +173,7 @@ def test_motions_that_nothing_holds_are_found(kind, supports, motions):
         (dict(mesh=skfem.MeshTet()), "dimension 2"),
         (dict(mesh="block.msh"), "scikit-fem mesh of dimension 2.*got str"),
         (dict(material=5.0), "material must be a Material"),
-        (dict(loads=(Plate("bottom", {"y": -1.0}),)), "plate .* moves in y, but a support"),
+        (dict(loads=(Plate("bottom", {"y": -1.0}),)), "plate .* moves in y, but the support"),
         (dict(supports=(Support("bottom"), Support("bottom", {"y": 1.0}))), "different value"),
     ],
 )

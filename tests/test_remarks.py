@@ -120,7 +120,7 @@ def test_notes_of_all_states_of_a_path_are_told_once(monkeypatch):
 
 def test_remarks_of_a_coupling_reach_the_reader(tmp_path, capsys, monkeypatch):
     couple, text = posing.couple, "a remark of a coupling"
-    monkeypatch.setattr(posing, "couple", lambda *given: replace(couple(*given), remarks=(text,)))
+    monkeypatch.setattr(posing, "couple", lambda *given: replace(couple(*given), fails=text))
     seen(tmp_path, capsys, text)
 
 
