@@ -1,5 +1,6 @@
 """Data flows one way, and what is heavy waits until it is used."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -36,3 +37,21 @@ def test_newton_steps_are_added_in_one_place():
     kernels = ROOT / "contactopt" / "methods"
     files = {path.name for path in kernels.rglob("*.py") if taken.search(path.read_text())}
     assert files == {"newton_loop.py"}
+
+
+def test_types_imported_for_annotations_have_names_of_their_own():
+    """The documentation finds such a type by its short name: two classes of one name are a warning
+    on every page that mentions either.
+    """
+    texts = [path.read_text() for path in (ROOT / "contactopt").rglob("*.py")]
+    classes = [name for text in texts for name in re.findall(r"^class (\w+)", text, re.M)]
+    late = {
+        alias.name
+        for text in texts
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for inner in node.body
+        if isinstance(inner, ast.ImportFrom) and str(inner.module).startswith("contactopt")
+        for alias in inner.names
+    }
+    assert not {name for name in late if classes.count(name) > 1}

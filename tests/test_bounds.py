@@ -15,7 +15,7 @@ from contactopt.bounds.displaced_stress import halved
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
 from contactopt.bounds.facing_facets import facet_rule, measures
 from contactopt.bounds.interval import interval
-from contactopt.bounds.nearest_tractions import Answer, BalancedMoments
+from contactopt.bounds.nearest_tractions import BalancedMoments, ForceResponse
 from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.bounds.uneven_traction import (
     CONSTANT,
@@ -172,7 +172,7 @@ def test_tractions_in_space_become_those_of_elements_in_balance():
     cells = Tetrahedra(skfem.MeshTet(p, cube.t))
     known = np.zeros((cube.facets.shape[1], 3), dtype=bool)
     balance = Balance(cells.forces_of_moments, known)
-    space = BalancedMoments(cells, MATERIAL, balance, Answer(1, clamped(cells.mesh)))
+    space = BalancedMoments(cells, MATERIAL, balance, ForceResponse(1, clamped(cells.mesh)))
     m, other = random.standard_normal((2, 3 * len(known), 3))
     made = space.of(m)
     forces, torques = on_elements(cells, made)
@@ -202,7 +202,7 @@ def test_a_linear_stress_is_its_own_equilibrated_stress():
     held = np.zeros((mesh.facets.shape[1], d), dtype=bool)
     held[cells.mesh.f2t[1] < 0] = True
     load, none = -np.einsum("ijj->i", slopes), np.zeros((*held.shape, d))
-    answer = Answer(1, clamped(cells.mesh))
+    answer = ForceResponse(1, clamped(cells.mesh))
     made, unbalanced = cells.equilibrated(MATERIAL, stress, load, held, none, answer)
     assert np.allclose(made, cells.data_of(stress), atol=1e-12) and unbalanced < 1e-12
     data = cells.data_of(stress)

@@ -24,7 +24,7 @@ from contactopt.bodies.solvers.multigrid import (
 )
 from contactopt.bodies.solvers.ordering import elimination_order
 from contactopt.bodies.solvers.sparse_products import SparseProduct
-from contactopt.bodies.solvers.system import Block, System
+from contactopt.bodies.solvers.system import Submatrix, System
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.concurrency import Crew
 
@@ -329,13 +329,13 @@ def test_a_crew_does_everything_once_and_reports_failures():
 
 
 def test_a_block_is_the_matrix_without_the_other_rows():
-    """Multigrid for a Block, which copies nothing, is multigrid for the rows and columns
+    """Multigrid for a Submatrix, which copies nothing, is multigrid for the rows and columns
     themselves.
     """
     A, *rest = BODIES["solid punch"]
     n = A.shape[0]
     whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))
-    block = System(Block(whole, np.arange(2, n + 2)), *rest)
+    block = System(Submatrix(whole, np.arange(2, n + 2)), *rest)
     b = np.random.default_rng(0).standard_normal(n)
     assert np.array_equal(
         made("multigrid", block).solve(b), made("multigrid", System(A, *rest)).solve(b)
@@ -351,7 +351,7 @@ def test_blocks_of_the_stiffness_are_those_of_its_rows(degree):
     node, component = np.empty((2, dofs.size), dtype=int)
     node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
     known = node[free], component[free], len(dofs)
-    fast, place, present = nodal_blocks(Block(body.A, free), *known)
+    fast, place, present = nodal_blocks(Submatrix(body.A, free), *known)
     slow, *others = nodal_blocks(body.A[free][:, free], *known)
     assert len(present) < dofs.shape[1] and len(place) < fast.shape[0]
     assert fast.blocksize == (3, 3) and abs(fast - slow).max() == 0

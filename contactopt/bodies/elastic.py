@@ -31,7 +31,7 @@ from contactopt.bodies.assembly import Assembly, Matrices
 from contactopt.bodies.motions import work
 from contactopt.bodies.protocol import Body, FreeMotions, Seen, Way
 from contactopt.bodies.solvers import make_solver, solver_type
-from contactopt.bodies.solvers.system import Block, BodySolver, System
+from contactopt.bodies.solvers.system import BodySolver, Submatrix, System
 from contactopt.bodies.thin import is_thin, on_ground
 from contactopt.defaults import EQUAL
 from contactopt.linear.operators import Product
@@ -256,7 +256,7 @@ def _solver(
     place[kept] = np.arange(len(kept))
     # Factors of A on these unknowns, or multigrid, which needs no copy of A.
     iterative = solver_type(name, len(kept), len(dofs)).iterative
-    A = Block(whole, kept) if iterative else whole[kept][:, kept]
+    A = Submatrix(whole, kept) if iterative else whole[kept][:, kept]
     last = None if trailing is None else place[trailing]
     system = System(A, node[kept], component[kept], body.locations, last)
     made = body.solver(system) or make_solver(name, system)

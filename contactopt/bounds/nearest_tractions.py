@@ -49,7 +49,7 @@ GAIN = 0.05  # of the energy: a step that makes it less by a smaller share is th
 STEPS = 30  # at most
 
 
-class Answer(NamedTuple):
+class ForceResponse(NamedTuple):
     """The degree of a body's displacements, and those (dim, nodes) under nodal forces per
     thickness.
     """
@@ -76,7 +76,7 @@ class BalancedMoments:
     cells: Tetrahedra
     material: Material
     balance: Balance
-    answer: Answer
+    answer: ForceResponse
 
     @cached_property
     def _slopes(self) -> sp.csr_matrix:

@@ -21,7 +21,7 @@ from contactopt.bounds.facing_facets import (
     measures,
     quadratic_shapes,
 )
-from contactopt.bounds.nearest_tractions import Answer
+from contactopt.bounds.nearest_tractions import ForceResponse
 from contactopt.bounds.simplices import Simplices
 from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.defaults import CLOSE
@@ -173,7 +173,7 @@ class PressedScene:
         value, row, column = (np.concatenate(parts) for parts in zip(*entries))
         return sp.csr_matrix((value, (row, column)), shape)
 
-    def answer(self, number: int) -> Answer:
+    def answer(self, number: int) -> ForceResponse:
         """How a body answers nodal forces."""
         body = self.bodies[number]
 
@@ -183,7 +183,7 @@ class PressedScene:
             U = body.displacement(own, np.zeros(len(body.motions.resultants))) - body.at_rest
             return np.asarray(U[body.body.unknowns])
 
-        return Answer(body.body.degree, moved)
+        return ForceResponse(body.body.degree, moved)
 
     def balanced(self, t: np.ndarray, resultants: np.ndarray) -> np.ndarray:
         """Tractions (k, dim) that balance resultants (p,) in the free motions, each scaled by what

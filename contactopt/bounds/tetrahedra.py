@@ -43,7 +43,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bounds.composite_element import WEIGHT, components, reference_stress
-from contactopt.bounds.nearest_tractions import Answer, BalancedMoments, Energy
+from contactopt.bounds.nearest_tractions import BalancedMoments, Energy, ForceResponse
 from contactopt.bounds.simplices import Simplices
 from contactopt.bounds.vertex_balance import Balance
 from contactopt.material import Material, lame
@@ -152,7 +152,7 @@ class Tetrahedra(Simplices):
         force: np.ndarray,
         held: np.ndarray,
         moments: np.ndarray,
-        answer: Answer,
+        answer: ForceResponse,
     ) -> tuple[np.ndarray, float]:
         """The data (e, inputs) of the stress s*, and the largest force out of balance at a vertex
         over that of an element.

@@ -29,7 +29,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from contactopt.bodies.motions import rigid_fields
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL, USUAL
 from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduct, galerkin
-from contactopt.bodies.solvers.system import Act, Block, BodySolver, System
+from contactopt.bodies.solvers.system import Act, BodySolver, Submatrix, System
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.budget import expect, spend
@@ -54,7 +54,7 @@ class MultigridSolver(BodySolver):
     def __init__(self, system: System):
         super().__init__(system)
         crew = Crew()
-        block = isinstance(system.A, Block)
+        block = isinstance(system.A, Submatrix)
         self.A = BlockProduct(system.A, crew) if block else SparseProduct(system.A, crew)
         self.cycle = VCycle(*system[:4], crew)
 
@@ -115,7 +115,7 @@ class VCycle:
 
     def __init__(
         self,
-        A: sp.csr_matrix | Block,
+        A: sp.csr_matrix | Submatrix,
         node: np.ndarray,
         component: np.ndarray,
         points: np.ndarray,
@@ -170,7 +170,7 @@ class VCycle:
         return sum(entries) / entries[0] if entries else 1.0
 
 
-class Answer(NamedTuple):
+class Iterated(NamedTuple):
     """Solution x (n,) of a linear system and the number of V-cycles that it took."""
 
     x: np.ndarray
@@ -179,7 +179,7 @@ class Answer(NamedTuple):
 
 def conjugate_gradients(
     A: SparseProduct | BlockProduct, cycle: VCycle, load: np.ndarray, rtol: float
-) -> Answer:
+) -> Iterated:
     """Solve A x = load, load (n,) [force], by conjugate gradients with a V-cycle B.
 
     It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`; BackendError if it does
@@ -193,7 +193,7 @@ def conjugate_gradients(
         size, previous = _dot(r, z), size
         goal = rtol**2 * size if goal is None else goal
         if 0 <= size <= goal:
-            return Answer(x, step)
+            return Iterated(x, step)
         if not 0 < size < np.inf:
             expect(slower=np.inf)
             raise BackendError(
@@ -312,7 +312,7 @@ def _largest_eigenvalue(A: SparseProduct) -> float:
 
 
 def nodal_blocks(
-    A: sp.csr_matrix | Block, node: np.ndarray, component: np.ndarray, dim: int
+    A: sp.csr_matrix | Submatrix, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
     """A matrix in single precision and blocks of the k nodes present, held unknowns as rows of
     their own; each unknown's place (n,) in it; the nodes (k,).
@@ -321,7 +321,7 @@ def nodal_blocks(
     place, size = own * dim + component, len(present) * dim
     held = np.full(size, np.median(A.diagonal()))
     held[place] = 0.0
-    if isinstance(A, Block):
+    if isinstance(A, Submatrix):
         blocks = getattr(A.whole, "blocksize", ()) == (dim, dim)
         if blocks and np.array_equal(A.kept, node * dim + component):
             return _masked(A.whole, present, held), place, present

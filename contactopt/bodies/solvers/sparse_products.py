@@ -20,7 +20,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.solvers.constants import GALERKIN, LARGE, SHARE
 from contactopt.bodies.solvers.mkl import library
-from contactopt.bodies.solvers.system import Block
+from contactopt.bodies.solvers.system import Submatrix
 from contactopt.linear.concurrency import Crew
 
 # oneMKL's names: A itself, no structure, blocks stored row by row
@@ -60,9 +60,9 @@ class SparseProduct:
 
 
 class BlockProduct:
-    """x (n,) -> A @ x for a Block A, by products with the whole matrix."""
+    """x (n,) -> A @ x for a Submatrix A, by products with the whole matrix."""
 
-    def __init__(self, block: Block, crew: Crew | None = None):
+    def __init__(self, block: Submatrix, crew: Crew | None = None):
         self.block, self.whole = block, SparseProduct(block.whole, crew)
 
     def __matmul__(self, x: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ COLUMNS = 64  # of the inverse that are made at a time, which bounds the memory 
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class Submatrix:
     """The rows and columns `kept` (n,) of a matrix `whole` (N, N), which are not copied."""
 
     whole: sp.csr_matrix
@@ -37,8 +37,8 @@ class System(NamedTuple):
     """What the solvers of one body are made from; the matrix must not change afterwards.
 
     A          (n, n) stiffness on the free displacement unknowns, symmetric positive definite
-               [force / length]; a Block is for iterative solvers, which then share the entries with
-               the body
+               [force / length]; a Submatrix is for iterative solvers, which then share the entries
+               with the body
     node       (n,) mesh node of each unknown;   component  (n,) its component, 0 .. dim - 1
     points     (dim, nodes) coordinates of the mesh nodes [length]
     trailing   (m,) unknowns whose block of the inverse is asked for (the contact unknowns), or None
