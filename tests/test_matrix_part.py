@@ -36,6 +36,7 @@ from contactopt import (
     solve,
 )
 from contactopt.coupling.matrices import matrices_of, write_matrices
+from contactopt.readings.plausibility import doubts
 
 E, NU = 70.0, 0.3
 BRICK = {2: skfem.MeshQuad, 3: skfem.MeshHex}
@@ -369,6 +370,31 @@ def test_input_that_lies_is_found(name):
     with pytest.raises(InputError, match=said.replace("(", r"\(")) as caught:
         solved_on(**{**base, **change(base)})
     assert str(caught.value).endswith(".") and str(caught.value).count(". ") == 0
+
+
+UNITS = {
+    "K in N/m beside mm": ((1e6, 1e6, 1, 1), ("mm", "MPa"), "stiffer than diamond: are K and its points"),
+    "one K in another unit": ((1, 1e6, 1, 1), ("a", "b"), "times as stiff as 'upper'"),
+    "points in m": ((1, 1, 1e-3, 1), ("a", "b"), "times as large as 'upper'"),
+    "all is well": ((1, 1, 1, 1), ("mm", "MPa"), None),
+}
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("name", UNITS)
+def test_matrices_in_another_unit_than_the_scene_are_told(name, dim):
+    (upper, lower, small, large), units, said = UNITS[name]
+    kind = BRICK[dim]
+    scene = pressed(dim, kind, 1, as_matrices=True)
+    bodies = [
+        replace(part, K=factor * part.K, points=size * np.asarray(part.points))
+        for part, factor, size in zip(scene.parts, (upper, lower), (small, large))
+    ]
+    scene = replace(scene, upper=bodies[0], lower=bodies[1], units=units)
+    notes = doubts(scene, reduce_bodies(scene).couplings, ())
+    assert (not notes) if said is None else any(said.split(",")[-1] in note for note in notes), (
+        notes
+    )
 
 
 def test_what_needs_elements_is_refused_in_a_sentence():
