@@ -373,7 +373,7 @@ def test_input_that_lies_is_found(name):
 
 
 UNITS = {
-    "K in N/m beside mm": ((1e6, 1e6, 1, 1), ("mm", "MPa"), "stiffer than diamond: are K and its points"),
+    "K in N/m beside mm": ((1e6, 1e6, 1, 1), ("mm", "MPa"), "than diamond: are K and its points"),
     "one K in another unit": ((1, 1e6, 1, 1), ("a", "b"), "times as stiff as 'upper'"),
     "points in m": ((1, 1, 1e-3, 1), ("a", "b"), "times as large as 'upper'"),
     "all is well": ((1, 1, 1, 1), ("mm", "MPa"), None),
