@@ -35,6 +35,7 @@ from contactopt import (
     simplify,
     solve,
 )
+from contactopt.bodies.fields import von_mises
 from contactopt.coupling.matrices import matrices_of, write_matrices
 from contactopt.readings.plausibility import doubts
 
@@ -359,6 +360,7 @@ WRONG = {
     "a function of another size": (
         lambda a: {"K": lambda load: load[:-1], "order": "node"}, "an array of shape"
     ),
+    "stresses of another shape": (lambda a: {"stress": lambda u: u.T}, "to stresses"),
     "a function without an order": (lambda a: {"K": lambda load: load}, "knows the numbering"),
 }  # fmt: skip
 
@@ -410,8 +412,11 @@ def test_what_needs_elements_is_refused_in_a_sentence():
 
 
 def test_a_run_writes_displacements_and_pictures_of_the_contact(tmp_path):
-    base = given()
-    scene = Scene("s", Rigid("wall", force={"y": -1.0}), MatrixPart("bed", **base), 0.3)
+    def stress(u):
+        return np.stack([u[0], u[1], 0 * u[0], u[0]], axis=1)
+
+    bed = MatrixPart("bed", stress=stress, **given())
+    scene = Scene("s", Rigid("wall", force={"y": -1.0}), bed, 0.3)
     result = run(scene, out=tmp_path)
     assert result.solution.solved
     names = {path.name for path in tmp_path.iterdir()}
@@ -419,6 +424,9 @@ def test_a_run_writes_displacements_and_pictures_of_the_contact(tmp_path):
     made = meshio.read(tmp_path / "bed.vtu")
     body, U = result.reduction.bodies[1], result.reduction.displaced(result.solution)[1]
     assert np.allclose(made.point_data["displacement"][:, :2], body.view.at_points(U).T)
+    expected = stress(body.view.at_points(U))
+    assert np.allclose(made.point_data["stress_yy"], expected[:, 1])
+    assert np.allclose(made.point_data["von_mises"], von_mises(expected))
     total = made.point_data["force"].sum(axis=0)
     assert np.allclose(total[1:], [-1, 0], atol=1e-9)
     assert np.allclose(made.point_data["reaction"].sum(axis=0) + total, 0, atol=1e-9)
