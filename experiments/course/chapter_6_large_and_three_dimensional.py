@@ -319,7 +319,8 @@ assert products["neumann"][-1] < 1.1 * products["neumann"][0]  # does not
 # %% tags=["hide-input"]
 m = 16
 distance = np.arange(1, 2 * m)
-row = np.pad((np.pi / 2 / m) ** 2 / np.sin(np.pi * distance / 2 / m) ** 2, (1, 0))
+sine = np.sin(np.pi * distance / 2 / m)
+row = np.pad((np.pi / 2 / m / sine) ** 2, (1, 0))
 shift = np.subtract.outer(np.arange(2 * m), np.arange(2 * m)) % (2 * m)
 fig, (left, right) = plt.subplots(
     1, 2, figsize=(7.2, 3.2), layout="constrained"
