@@ -348,6 +348,7 @@ _ = right.set(xlabel="node", yticks=(-1, 0, 1), title="two of its eigenvectors")
 # (With another $m$ than a power of two the last group has no place. Then rows do not sum up to
 # zero, and the matrix is no seminorm.)
 
+
 # %%
 def sparse_seminorm(m):
     """First column of equation (27), for m a power of two."""
