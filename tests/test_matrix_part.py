@@ -35,7 +35,9 @@ from contactopt import (
     simplify,
     solve,
 )
+from contactopt.bodies.fields import von_mises
 from contactopt.coupling.matrices import matrices_of, write_matrices
+from contactopt.readings.plausibility import doubts
 
 E, NU = 70.0, 0.3
 BRICK = {2: skfem.MeshQuad, 3: skfem.MeshHex}
@@ -358,6 +360,7 @@ WRONG = {
     "a function of another size": (
         lambda a: {"K": lambda load: load[:-1], "order": "node"}, "an array of shape"
     ),
+    "stresses of another shape": (lambda a: {"stress": lambda u: u.T}, "to stresses"),
     "a function without an order": (lambda a: {"K": lambda load: load}, "knows the numbering"),
 }  # fmt: skip
 
@@ -369,6 +372,31 @@ def test_input_that_lies_is_found(name):
     with pytest.raises(InputError, match=said.replace("(", r"\(")) as caught:
         solved_on(**{**base, **change(base)})
     assert str(caught.value).endswith(".") and str(caught.value).count(". ") == 0
+
+
+UNITS = {
+    "K in N/m beside mm": ((1e6, 1e6, 1, 1), ("mm", "MPa"), "than diamond: are K and its points"),
+    "one K in another unit": ((1, 1e6, 1, 1), ("a", "b"), "times as stiff as 'upper'"),
+    "points in m": ((1, 1, 1e-3, 1), ("a", "b"), "times as large as 'upper'"),
+    "all is well": ((1, 1, 1, 1), ("mm", "MPa"), None),
+}
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("name", UNITS)
+def test_matrices_in_another_unit_than_the_scene_are_told(name, dim):
+    (upper, lower, small, large), units, said = UNITS[name]
+    kind = BRICK[dim]
+    scene = pressed(dim, kind, 1, as_matrices=True)
+    bodies = [
+        replace(part, K=factor * part.K, points=size * np.asarray(part.points))
+        for part, factor, size in zip(scene.parts, (upper, lower), (small, large))
+    ]
+    scene = replace(scene, upper=bodies[0], lower=bodies[1], units=units)
+    notes = doubts(scene, reduce_bodies(scene).couplings, ())
+    assert (not notes) if said is None else any(said.split(",")[-1] in note for note in notes), (
+        notes
+    )
 
 
 def test_what_needs_elements_is_refused_in_a_sentence():
@@ -384,8 +412,11 @@ def test_what_needs_elements_is_refused_in_a_sentence():
 
 
 def test_a_run_writes_displacements_and_pictures_of_the_contact(tmp_path):
-    base = given()
-    scene = Scene("s", Rigid("wall", force={"y": -1.0}), MatrixPart("bed", **base), 0.3)
+    def stress(u):
+        return np.stack([u[0], u[1], 0 * u[0], u[0]], axis=1)
+
+    bed = MatrixPart("bed", stress=stress, **given())
+    scene = Scene("s", Rigid("wall", force={"y": -1.0}), bed, 0.3)
     result = run(scene, out=tmp_path)
     assert result.solution.solved
     names = {path.name for path in tmp_path.iterdir()}
@@ -393,6 +424,9 @@ def test_a_run_writes_displacements_and_pictures_of_the_contact(tmp_path):
     made = meshio.read(tmp_path / "bed.vtu")
     body, U = result.reduction.bodies[1], result.reduction.displaced(result.solution)[1]
     assert np.allclose(made.point_data["displacement"][:, :2], body.view.at_points(U).T)
+    expected = stress(body.view.at_points(U))
+    assert np.allclose(made.point_data["stress_yy"], expected[:, 1])
+    assert np.allclose(made.point_data["von_mises"], von_mises(expected))
     total = made.point_data["force"].sum(axis=0)
     assert np.allclose(total[1:], [-1, 0], atol=1e-9)
     assert np.allclose(made.point_data["reaction"].sum(axis=0) + total, 0, atol=1e-9)

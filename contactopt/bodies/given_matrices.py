@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembled import Surface
 from contactopt.bodies.assembly import Matrices
+from contactopt.bodies.fields import von_mises
 from contactopt.bodies.solvers.system import BodySolver, System
 from contactopt.errors import InputError
 
@@ -29,6 +30,8 @@ class GivenMatrices(Matrices):
     moving    (dim N, n) D: the displacements of the points in the caller's numbering
     solves    function that solves K U = F, if K itself is not known
     facets    name of each surface -> (m, j) points of its facets, as they are given
+    stresses  displacements of the points (dim, N) -> their stresses (N, 4 or 6), or None
+    names     of the components of these stresses
     """
 
     unknowns: np.ndarray
@@ -37,6 +40,8 @@ class GivenMatrices(Matrices):
     moving: sp.csr_matrix
     solves: Callable[[np.ndarray], np.ndarray] | None
     facets: Mapping[str, np.ndarray]
+    stresses: Callable[[np.ndarray], np.ndarray | None]
+    names: tuple[str, ...]
 
     @property
     def contact_dofs(self) -> np.ndarray:
@@ -49,7 +54,7 @@ class GivenMatrices(Matrices):
 
     def write_vtu(self, path: Path, U: np.ndarray, force: np.ndarray) -> None:
         """Write the points and the facets of all surfaces with the displacement, the contact forces
-        and, where K is known, the forces of supports and plates at the points.
+        and, where they are known, the forces of supports and plates and the stresses at the points.
         """
         import meshio
 
@@ -63,6 +68,9 @@ class GivenMatrices(Matrices):
             (CELLS[len(self.locations), facets.shape[1]], facets) for facets in self.facets.values()
         ]
         vectors = {name: np.pad(each, ((0, lack), (0, 0))).T for name, each in data.items()}
+        if (stress := self.stresses(data["displacement"])) is not None:
+            vectors["von_mises"] = von_mises(stress)
+            vectors |= {f"stress_{name}": own for name, own in zip(self.names, stress.T)}
         points = np.pad(self.locations.T, ((0, 0), (0, lack)))
         meshio.Mesh(points, cells, vectors).write(path, file_format="vtu")
 

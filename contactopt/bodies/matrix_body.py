@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -137,6 +137,8 @@ def assemble_matrices(
         D,
         part.solves,
         {name: np.asarray(own, dtype=int) for name, own in part.facets.items()},
+        partial(part.stresses, scene.kind),
+        scene.analysis.stresses,
     )
     return MatrixBody(body, part)
 

@@ -14,7 +14,9 @@ from contactopt.cards import count
 from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
+from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import STRESSES
+from contactopt.scenes.matrix_part import MatrixPart
 from contactopt.scenes.scene import Part, Scene
 
 # of the extent of a surface, up to which a closed gap is small, however fine its facets are
@@ -37,7 +39,7 @@ def doubts(
     found += [note for part in meshed for note in _pointed(part)]
     found += _unloaded(scene, couplings)
     found += _missing_planes(scene, planes)
-    return [*found, *_stiffness(scene), *_sizes(meshed), *_gaps(scene, couplings)]
+    return [*found, *_stiffness(scene), *_sizes(scene), *_gaps(scene, couplings)]
 
 
 def _unloaded(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
@@ -128,36 +130,61 @@ def _faint_loads(scene: Scene, part: Part) -> list[str]:
 
 def _stiffness(scene: Scene) -> list[str]:
     """Young's moduli that no solid has, or that are far from each other."""
-    elastic: list[Any] = [part for part in scene.parts if hasattr(part, "material")]
     notes, unit = [], scene.units[1]
-    for part in elastic if unit in STRESSES else ():
-        E = part.material.E * STRESSES[unit]
-        if not SOFTEST < E < STIFFEST:
-            like = "stiffer than diamond" if E >= STIFFEST else "softer than any solid"
-            notes.append(
-                f"body '{part.name}' has E = {part.material.E:.3g} {unit}, {like}: is it in {unit}?"
-            )
-    for one, other in combinations(elastic, 2):
-        soft, stiff = sorted((one, other), key=lambda part: part.material.E)
-        ratio = stiff.material.E / soft.material.E
+    moduli = _moduli(scene)
+    for name, (E, asked) in moduli.items() if unit in STRESSES else ():
+        if not SOFTEST < E * STRESSES[unit] < STIFFEST:
+            hard = E * STRESSES[unit] >= STIFFEST
+            like = "stiffer than diamond" if hard else "softer than any solid"
+            notes.append(f"body '{name}' has E = {E:.3g} {unit}, {like}: {asked} in {unit}?")
+    for names in combinations(moduli, 2):
+        soft, stiff = sorted(names, key=lambda name: moduli[name][0])
+        ratio = moduli[stiff][0] / moduli[soft][0]
         if ratio > STIFFER:
             notes.append(
-                f"body '{stiff.name}' is {ratio:.1e} times as stiff as '{soft.name}': are both E in"
-                " the same unit? A body that does not deform can be a rigid one."
+                f"body '{stiff}' is {ratio:.1e} times as stiff as '{soft}': are both given in the"
+                " same unit? A body that does not deform can be a rigid one."
             )
     return notes
 
 
-def _sizes(meshed: Sequence[Part]) -> list[str]:
+def _moduli(scene: Scene) -> dict[str, tuple[float, str]]:
+    """name -> Young's modulus [stress] and the words that ask for its unit; where a body is given
+    by its matrices, its order of size: K_ii of a point is some E h^(dim - 2) times the depth.
+    """
+    known: dict[str, tuple[float, str]] = {}
+    for part in scene.parts:
+        if isinstance(part, MatrixPart):
+            diagonal = part.K.diagonal()
+            if diagonal.any():
+                x = part.coordinates(scene.dim)
+                h = float(np.prod(np.ptp(x, axis=1)) / x.shape[1]) ** (1 / scene.dim)
+                kind = KINDS[scene.kind]
+                depth = kind.measure(scene.thickness) * (abs(x[0]).mean() if kind.revolved else 1)
+                usual = float(np.median(diagonal[diagonal > 0]))
+                own = usual * h ** (2 - scene.dim) / (depth * scene.copies)
+                known[part.name] = own, "are K and its points in the units of the scene, stress"
+        elif hasattr(part, "material"):
+            known[part.name] = part.material.E, "is it"
+    return known
+
+
+def _sizes(scene: Scene) -> list[str]:
     """Bodies of which one vanishes beside the other."""
     notes = []
-    size = {part.name: float(np.linalg.norm(np.ptp(part.mesh.p, axis=1))) for part in meshed}
+    points = {part.name: part.mesh.p for part in scene.meshed.values() if part.given}
+    points |= {
+        part.name: part.coordinates(scene.dim)
+        for part in scene.parts
+        if isinstance(part, MatrixPart)
+    }
+    size = {name: float(np.linalg.norm(np.ptp(x, axis=1))) for name, x in points.items()}
     for names in combinations(size, 2):
         small, large = sorted(names, key=lambda name: size[name])
         ratio = size[large] / size[small]
         if ratio > LARGER:
             notes.append(
-                f"body '{large}' is {ratio:.0f} times as large as '{small}': are both meshes in the"
+                f"body '{large}' is {ratio:.0f} times as large as '{small}': are both given in the"
                 " unit of length of the scene?"
             )
     return notes

@@ -61,6 +61,9 @@ class MatrixPart:
                  may then also be those before the constraints, of dim N unknowns. `fixed` counts
                  the unknowns of the points
     motions      (n, p) free motions, K motions = 0; None: those rigid motions that nothing resists
+    stress       a function that takes displacements of the points (dim, N) [length] and returns the
+                 stresses there (N, 4), in space (N, 6), xx, yy, zz, xy[, yz, xz] [stress], or in
+                 an axisymmetric scene rr, zz, tt, rz, for files
     """
 
     name: str
@@ -75,6 +78,7 @@ class MatrixPart:
     order: Any = "auto"
     constraints: Any = None
     motions: Any = None
+    stress: Callable[[np.ndarray], np.ndarray] | None = None
     solves: Callable[[np.ndarray], np.ndarray] | None = field(default=None, init=False)
 
     elastic: ClassVar[Literal[True]] = True
@@ -188,8 +192,22 @@ class MatrixPart:
             check_size(f"the length of body '{self.name}'", float(length))
         for name, given in self.facets.items():
             self._check_facets(name, given, dim)
+        self.stresses(kind, np.zeros((dim, self.points.size // dim)))
         for load in self.loads:
             load.check(self.name, kind)
+
+    def stresses(self, kind: str, u: np.ndarray) -> np.ndarray | None:
+        """(N, 4 or 6) stresses at the points under displacements u (dim, N), if they are known."""
+        if self.stress is None:
+            return None
+        shape = u.shape[1], len(KINDS[kind].stresses)
+        made = real_array(f"the stresses of body '{self.name}'", self.stress(u))
+        if made.shape != shape:
+            raise self._wrong(
+                f"its stress must take displacements {u.shape} to stresses {shape}, that is"
+                f" {', '.join(KINDS[kind].stresses)} at each point; got the shape {made.shape}."
+            )
+        return made
 
     def coordinates(self, dim: int) -> np.ndarray:
         """(dim, N) the points [length]."""

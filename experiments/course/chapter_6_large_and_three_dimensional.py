@@ -315,7 +315,25 @@ assert products["neumann"][-1] < 1.1 * products["neumann"][0]  # does not
 # $$ 2 \Bigl(\frac{\pi}{2m}\Bigr)^2 \sum_{l = 1}^{2m - 1} \frac{\sin^2 (\pi j l / 2m)}{\sin^2 (\pi l / 2m)} = \frac{\pi^2}{2 m^2}\, j\, (2m - j), \qquad 0 \le j \le m . $$
 #
 # It is between one half and one times $\pi^2 j / m$: *equivalent* to the wave number.
-#
+
+# %% tags=["hide-input"]
+m = 16
+distance = np.arange(1, 2 * m)
+sine = np.sin(np.pi * distance / 2 / m)
+row = np.pad((np.pi / 2 / m / sine) ** 2, (1, 0))
+shift = np.subtract.outer(np.arange(2 * m), np.arange(2 * m)) % (2 * m)
+fig, (left, right) = plt.subplots(
+    1, 2, figsize=(7.2, 3.2), layout="constrained"
+)
+image = left.imshow(np.ma.masked_equal(row[shift], 0), norm="log", cmap="Blues")
+left.set(xlabel="node", ylabel="node", title="weights of the pairs")
+fig.colorbar(image, ax=left)
+nodes = np.arange(2 * m)
+for wave, color in ((1, "C0"), (3, "C1")):
+    right.plot(nodes, np.cos(np.pi * wave * nodes / m), color + "o-", ms=3)
+_ = right.set(xlabel="node", yticks=(-1, 0, 1), title="two of its eigenvectors")
+
+# %% [markdown]
 # **Step 3: the paper makes it sparse.** Its equation (27) puts the distances into groups: 1; then 2
 # and 3; then 4 to 7; then 8 to 15. The group $2^{i-1} \le l \lt 2^i$ gets one distance, $2^i - 1$, with
 # the sum of its weights, $w_i = \sum_l 1 / l^2$. So a row has about $2 \log_2 m$ entries, and a product
@@ -329,7 +347,35 @@ assert products["neumann"][-1] < 1.1 * products["neumann"][0]  # does not
 # multiple of $\theta$ as well. One distance fits the wave, and gives at least a multiple of $\theta$.
 # (With another $m$ than a power of two the last group has no place. Then rows do not sum up to
 # zero, and the matrix is no seminorm.)
-#
+
+
+# %%
+def sparse_seminorm(m):
+    """First column of equation (27), for m a power of two."""
+    column, distance = np.zeros(2 * m), np.arange(1, m)
+    for i in range(1, int(np.log2(m)) + 1):
+        group = (distance >= 2 ** (i - 1)) & (distance < 2**i)
+        column[[2**i - 1, 1 - 2**i]] = -np.sum(1.0 / distance[group] ** 2)
+    column[0] = -column.sum()
+    return column
+
+
+# %% tags=["hide-input"]
+angle = np.pi / m * nodes
+x = np.stack([np.sin(angle), np.cos(angle)])
+fig, axes = plt.subplots(1, 2, figsize=(7.2, 3.6), layout="constrained")
+for ax, weights, title in zip(
+    axes,
+    (row, -sparse_seminorm(m)),
+    ("all pairs", "one distance for each group"),
+):
+    for node in nodes[1:][weights[1:] > 0]:
+        ax.plot(*x[:, [0, node]], "C0", lw=6 * np.sqrt(weights[node]))
+    ax.plot(*x, "ko", ms=4)
+    ax.set(aspect="equal", title=title)
+    ax.axis("off")
+
+# %% [markdown]
 # **Step 4: a contact is only a part of the curve.** Let $E$ extend a displacement of the $N$ contact
 # nodes by zero to all $2m$ nodes, and let $Q_b$ be the circulant for the body $b$. The paper's
 # equation (25) is
@@ -346,7 +392,27 @@ assert products["neumann"][-1] < 1.1 * products["neumann"][0]  # does not
 #
 # So the extension makes the energy larger by at most a multiple of $\log^2 N$. This is the bound
 # $O(\log^2 N)$ of the paper. *It comes from displacements that do not vanish at the ends.*
-#
+
+# %% tags=["hide-input"]
+t = np.linspace(0, 2, 400)
+u = np.where(t < 1, 0.8 + 0.2 * np.sin(np.pi * t) ** 2, np.nan)
+fig, axes = plt.subplots(
+    1, 2, figsize=(7.2, 2.6), layout="constrained", sharey=True
+)
+for ax, rest, title in zip(
+    axes, (0 * t, u[::-1]), ("extended by zero", "by its mirror image")
+):
+    ax.plot(t, np.where(t > 1, rest, np.nan), "C1", lw=2)
+    ax.plot(t, u, "C0", lw=2)
+    ax.axvspan(0, 1, color="0.93")
+    ax.text(0.5, 0.1, "contact", ha="center")
+    ax.set(title=title, xticks=[], xlabel="along the curve", ylim=(-0.05, 1.1))
+for place in (0, 1, 2):
+    axes[0].plot([place, place], [0, 0.8], "C3:", lw=2)
+axes[0].text(1.04, 0.4, "jump", color="C3")
+_ = axes[0].set(ylabel="displacement $u$", yticks=[])
+
+# %% [markdown]
 # **Step 5: forces have no such jump.** Outside the contact the force *is* zero. Equation (26) extends
 # forces. With $L$ for the $H^1$ norm, whose symbol grows like $1 + k^2$, the circulant $L^{-1} Q$ has a
 # symbol like $1 / |k|$. It resembles the compliance, and
@@ -364,16 +430,6 @@ def circulant(symbol):
     """The matrix with this symbol for the waves 0, 1, ... of 2 m nodes."""
     waves = np.fft.fft(np.eye(len(symbol)), axis=0)
     return np.fft.ifft(symbol[:, None] * waves, axis=0).real
-
-
-def sparse_seminorm(m):
-    """First column of equation (27), for m a power of two."""
-    column, distance = np.zeros(2 * m), np.arange(1, m)
-    for i in range(1, int(np.log2(m)) + 1):
-        group = (distance >= 2 ** (i - 1)) & (distance < 2**i)
-        column[[2**i - 1, 1 - 2**i]] = -np.sum(1.0 / distance[group] ** 2)
-    column[0] = -column.sum()
-    return column
 
 
 kappa = {"none": [], "P21": [], "P22": []}
