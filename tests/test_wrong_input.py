@@ -288,3 +288,13 @@ def test_a_plate_that_no_contact_can_hold(method, column):
         assert not solve(problem, method, max_iterations=50, time_limit=1.0).solved
     except InputError as error:
         assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("form, words", [("fclib", "it is a folder"), ("mtx", "file/a'")])
+def test_an_export_that_cannot_be_written_names_its_path(tmp_path, capsys, form, words):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("")
+    out = {"fclib": "folder", "mtx": "file/a"}[form]
+    command = ["export", "punch-2d", "--set", "elements=4", "--to", form]
+    assert main([*command, "--out", str(tmp_path / out)]) == 2
+    assert words in capsys.readouterr().err

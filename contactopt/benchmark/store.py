@@ -257,7 +257,8 @@ def load(path: str | Path, absent: bool = False) -> pd.DataFrame:
     except KeyError as error:
         raise InputError(f"cannot read the results '{path}': it has no column {error}.") from error
     except (OSError, ValueError, TypeError) as error:
-        raise InputError(f"cannot read the results '{path}': {error}") from error
+        why = getattr(error, "strerror", None) or "it is damaged, or no table of runs"
+        raise InputError(f"cannot read the results '{path}': {why}.") from error
     return table
 
 

@@ -23,7 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.coupling.reduction import Reduction
-from contactopt.files.writing import whole_file
+from contactopt.files.writing import whole_file, whole_folder
 
 
 def matrices_of(reduction: Reduction) -> dict[str, Any]:
@@ -59,10 +59,10 @@ def write_matrices(reduction: Reduction, path: Path, form: str) -> None:
 
     found = matrices_of(reduction)
     if form == "mtx":
-        path.mkdir(parents=True, exist_ok=True)
-        for name, value in found.items():
-            given = value if sp.issparse(value) else np.atleast_2d(np.asarray(value).T).T
-            mmwrite(path / f"{name}.mtx", given, precision=17)
+        with whole_folder(path) as folder:
+            for name, value in found.items():
+                given = value if sp.issparse(value) else np.atleast_2d(np.asarray(value).T).T
+                mmwrite(folder / f"{name}.mtx", given, precision=17)
         return
     flat: dict[str, Any] = {}
     for name, value in found.items():

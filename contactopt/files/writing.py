@@ -10,6 +10,7 @@ import math
 import os
 import shutil
 import signal
+import sys
 import tempfile
 import threading
 import time
@@ -81,6 +82,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     It has the same name, from whose ending many writers take their format.
     """
     path = Path(path)
+    if path.is_dir():
+        raise InputError(f"cannot write '{path}': it is a folder; choose the name of a file.")
     with whole_folder(path.parent) as staging:
         yield staging / path.name
 
@@ -151,6 +154,24 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
         check_name("the file", name)
         with suppress(FileNotFoundError, NotADirectoryError):
             (folder / name).unlink()
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Within this block nothing is printed, neither by libraries that do not ask Python."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [os.dup(place) for place in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for place in (1, 2):
+            os.dup2(nowhere, place)
+        yield
+    finally:
+        for place, own in zip((1, 2), kept):
+            os.dup2(own, place)
+        for own in (*kept, nowhere):
+            os.close(own)
 
 
 @contextmanager

@@ -22,6 +22,7 @@ import numpy as np
 from contactopt.checks import check_number, meant
 from contactopt.defaults import install
 from contactopt.errors import InputError
+from contactopt.files.writing import quiet
 
 ENDINGS = (".step", ".stp", ".iges", ".igs", ".brep")
 SHARE = 15  # usual number of elements along the diagonal of the smallest body
@@ -59,7 +60,8 @@ def mesh_part(
         raise InputError(f"part '{path}' does not exist.")
     with _kernel() as gmsh:
         try:
-            gmsh.model.occ.importShapes(str(path))
+            with quiet():  # OpenCASCADE prints what is wrong, too
+                gmsh.model.occ.importShapes(str(path))
             gmsh.model.occ.synchronize()
         except Exception as error:  # the class of Gmsh's errors is Exception
             raise InputError(f"part '{path}' cannot be read: {_reason(error)}.") from error

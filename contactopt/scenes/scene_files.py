@@ -99,10 +99,6 @@ def read_scenes(
     for state in range(1, total):
         reading.state = state
         states.append(_scene(path, table(), reading)[0])
-    if total > 1 and "accuracy" in solve:
-        raise top.fail(
-            "an accuracy can be asked for only without a load path.", "solve", "accuracy"
-        )
     where = top.lines.get(("contacts",), "")  # of those that are found
     lines = {c.name: top.lines.get(("contacts", i), where) for i, c in enumerate(first.contacts)}
     known = [own.name for own in first.bodies if ("bodies", own.name) in top.lines]
