@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
 from pathlib import Path
@@ -215,8 +215,16 @@ def _states(scene: Any, file: SceneFile | None, changes: dict[str, Any]) -> tupl
         changes = {name: value for name, value in changes.items() if name != "elements"}
     if file is not None:
         return file.states
-    if isinstance(scene, str):
-        return make_path(scene, **changes) if scene in PATHS else (make_scene(scene, **changes),)
+    if isinstance(scene, str | Path):
+        if Path(scene).is_file():
+            raise InputError(f"'{scene}' is no scene file: the name of one ends in .toml.")
+        name = str(scene)
+        return make_path(name, **changes) if name in PATHS else (make_scene(name, **changes),)
+    if not isinstance(scene, Scene):
+        raise InputError(
+            "a scene is a Scene, its name or a scene file; got"
+            f" {type(scene).__name__}. contactopt.follow solves the scenes of a load path."
+        )
     known = [field.name for field in fields(scene)]
     for name in changes:
         if name not in known:
@@ -296,7 +304,8 @@ def _result(
     with _clock(seconds, "recover"):
         fields = recover(reduction, solution)
     with _clock(seconds, "readings"):
-        summary = _summary(reduction, solution, names)
+        states = [] if path is None else [state.scene for state in path.states]
+        summary = _summary(reduction, solution, names, states)
         summary |= {"status": ended.status.label, "message": ended.message}
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
@@ -319,8 +328,10 @@ def _result(
     return Result(reduction.scene, reduction, ended, fields, solved.zones, summary, path, estimate)
 
 
-def _summary(reduction: Reduction, solution: Solution, names: tuple[str, ...]) -> dict[str, Any]:
-    """What is known of the answer on one mesh at one state."""
+def _summary(
+    reduction: Reduction, solution: Solution, names: tuple[str, ...], states: Sequence[Scene] = ()
+) -> dict[str, Any]:
+    """What is known of the answer on one mesh at one state, of those of a load path."""
     problem, scene = reduction.problem, reduction.scene
     found = tables(reduction, solution)
     single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
@@ -328,7 +339,7 @@ def _summary(reduction: Reduction, solution: Solution, names: tuple[str, ...]) -
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    known = doubts(scene, reduction.couplings, reduction.planes)
+    known = doubts(scene, reduction.couplings, reduction.planes, states)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
         "scene": scene.name,

@@ -99,6 +99,12 @@ def test_one_triangle(nu):
     assert report.exact and report.guaranteed.unique == pytest.approx(3 - 4 * nu, abs=1e-10)
 
 
+@pytest.mark.parametrize("shear", [0.5, 0.9])  # just held, and slides
+def test_a_plate_that_determines_all_forces(shear):
+    problem = InterfaceProblem(np.eye(2), [[0.0, 0.0]], 0.5, np.eye(2), [-1.0, shear])
+    assert diagnose(problem).relaxation in ("tight", "not tight", "undecided")
+
+
 def test_a_plate_that_determines_the_normal_force_leaves_no_threshold():
     Q = one_contact((0.0, 0.0), 1.0).Q
     report = diagnose(

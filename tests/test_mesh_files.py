@@ -366,10 +366,18 @@ def test_hostile_files_end_in_one_sentence(tmp_path, monkeypatch):
         tmp_path / "a.dat", meshio.Mesh(SQUARE[:, :2], [("quad", TWO)]), file_format="tecplot"
     )
     (tmp_path / "cut.dat").write_bytes((tmp_path / "a.dat").read_bytes()[:-40])
-    monkeypatch.setattr(mesh_formats, "PATIENCE", (2.0, 0.0))
-    # whose reader waits for the end of a file for ever
-    with pytest.raises(InputError, match="tecplot"):
-        load_mesh(tmp_path / "cut.dat")
+    (tmp_path / "a.off").write_text("OFF\n")
+    (tmp_path / "a.h5m").write_text("x")
+    # whose readers wait for the end of a file for ever, or end in words of Python
+    for limit, value, name in (
+        ("PATIENCE", (1.0, 0.0), "cut.dat"),
+        ("WORK", (1.0, 0.0), "a.off"),
+        ("WORK", (9.0, 0.0), "a.h5m"),
+    ):
+        monkeypatch.setattr(mesh_formats, limit, value)
+        with pytest.raises(InputError, match=r"no end after 1 s|a number or a word is not"):
+            load_mesh(tmp_path / name)
+        monkeypatch.undo()
 
 
 def test_boundaries_by_place():
@@ -891,7 +899,7 @@ def test_partitioned_files_of_gmsh_are_refused(gmsh, tmp_path):
 SU2 = (
     "% a square of two kinds of triangles\nNDIME= 2\nNELEM= 2\n5 0 1 2 0\n5 0 2 3 1\nNPOIN= 4\n"
     "0. 0. 0\n1. 0. 1\n1. 1. 2\n0. 1. 3\nNMARK= 3\nMARKER_TAG= 1\nMARKER_ELEMS= 1\n3 0 1\n"
-    "MARKER_TAG= wall\nMARKER_ELEMS= 2\n3 1 2\n3 2 3\nMARKER_TAG= 2\nMARKER_ELEMS= 1\n3 3 0\n"
+    "MARKER_TAG= w\u00e4nd\nMARKER_ELEMS= 2\n3 1 2\n3 2 3\nMARKER_TAG= 2\nMARKER_ELEMS= 1\n3 3 0\n"
 )
 
 
@@ -913,13 +921,16 @@ MEDIT = (
     [
         ("a.msh", MSH2 + VIEW, "low"),
         ("a.msh", MSH2 + VIEW + VIEW.replace("Node", "Element").replace("T", "s"), "low"),
+        ("a.msh", MSH2.replace("2 2 2 7 7 1", "2 2 0 1"), "low"),  # elements without tags
+        ("a.msh", MSH2.replace("3 2 2 7 7 1", "3 2 4 7 7 1 1 1"), "low"),  # of a partition
+        ("a.msh", MSH2.replace('"low"', '"my "low" side"'), 'my "low" side'),
         ("a.mesh", MEDIT, "3"),
         ("a.mesh", " ".join(MEDIT.replace(" # corner", "").split()), "3"),
         ("a.mesh", MEDIT.replace(" ", "\n").replace("#\ncorner", ""), "3"),
     ],
 )
 def test_results_are_passed_over_and_free_formats_are_free(tmp_path, name, text, low):
-    (tmp_path / name).write_text(text)
+    (tmp_path / name).write_text(text, "utf-8")
     mesh = load_mesh(tmp_path / name)
     assert volume(mesh) == pytest.approx(1) and len(mesh.boundaries[low]) == 1
     for end in range(20, len(text) - 4, 9):  # a file that is cut has its volume, or is refused
@@ -934,7 +945,7 @@ def test_results_are_passed_over_and_free_formats_are_free(tmp_path, name, text,
     "name, text, words",
     [
         ("a.mesh", MEDIT.replace("Edges", "Polygons"), "line 9: Polygons are not read"),
-        ("a.msh", MSH2.replace("7 7 1 3 4", "7 7 1 3 9"), "a number or a word is not where"),
+        ("a.msh", MSH2.replace("7 7 1 3 4", "7 7 1 3 9"), "an element names a node that is not"),
         ("a.msh", MSH2.replace("3 1 1 0", "3 1 x 0"), "a number or a word is not where"),
         ("a.mesh", MEDIT.replace("Dimension 2\n", ""), "must stand before Vertices"),
         ("a.mesh", MEDIT.replace("1 3 4 7", "1 3 4"), "Triangles are 2 rows of 4 numbers, not 7"),
@@ -951,9 +962,9 @@ def test_results_are_passed_over_and_free_formats_are_free(tmp_path, name, text,
 )
 def test_markers_of_su2_keep_their_names_and_second_orders_are_refused(tmp_path, name, text, words):
     """A number and a name that meshio counts to the same number are two boundaries."""
-    (tmp_path / "whole.su2").write_text(SU2)
+    (tmp_path / "whole.su2").write_text(SU2, "utf-8")
     sides = load_mesh(tmp_path / "whole.su2").boundaries
-    assert {side: len(facets) for side, facets in sides.items()} == {"1": 1, "wall": 2, "2": 1}
-    (tmp_path / name).write_text(text)
+    assert {side: len(facets) for side, facets in sides.items()} == {"1": 1, "w\u00e4nd": 2, "2": 1}
+    (tmp_path / name).write_text(text, "utf-8")
     with pytest.raises(InputError, match=words):
         load_mesh(tmp_path / name)

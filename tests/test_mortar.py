@@ -19,6 +19,7 @@ from contactopt import (
     Plate,
     Pressure,
     Support,
+    Traction,
     reduce,
     reduce_bodies,
     scenes,
@@ -603,8 +604,11 @@ def test_hertz_on_meshes_two_to_three(name, monkeypatch):
     assert errors[0] < 1.3 * errors[1]
 
 
-def test_a_half_model_is_half_of_the_whole():
-    """The component that symmetry holds is taken at the node and at the place facing it alone."""
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_half_model_is_half_of_the_whole(degree):
+    """The component that symmetry holds is taken at the node and at the place facing it alone, and
+    the rounding of kinks sees the mirror image.
+    """
     results = []
     for copies in (1, 2):
         parts = []
@@ -627,13 +631,46 @@ def test_a_half_model_is_half_of_the_whole():
                     contact="bottom" if load else "top",
                 )
             )
-        coupled = couple(Scene("s", *parts, 0.2, degree=2, copies=copies))
+        coupled = couple(Scene("s", *parts, 0.2, degree=degree, copies=copies))
         problem, solution = coupled.problem, solve(coupled.problem, tol=1e-12)
         x = problem.coordinates[0]
         right = np.flatnonzero(x > 1e-9)
         results.append((solution.reactions[right[np.argsort(x[right])]], solution.multipliers))
     (whole, down), (half, same) = results
     assert np.allclose(2 * whole, half, atol=1e-9) and np.allclose(down, same, rtol=1e-9)
+
+
+@pytest.mark.parametrize("carrier", ["upper", "lower"])
+def test_a_quarter_of_plates_in_space_is_a_quarter_of_the_whole(carrier):
+    """Linear hexahedra, one surface curved, with friction."""
+    results = []
+    for cut in (False, True):
+        parts = []
+        for name, cells, heights in (("upper", 2, (0, 0.5, 1)), ("lower", 3, (-1, -0.5, 0))):
+            x = np.linspace(0, 2, cells + 1)
+            x = x if cut else np.concatenate([-x[:0:-1], x])
+            mesh = rename(tensor_mesh(x, x, heights), top="z+", bottom="z-")
+            pressed = {"pressed": lambda p: (p[2] > 0.9) & (abs(p[0]) < 1) & (abs(p[1]) < 1)}
+            mesh = mesh.with_boundaries(pressed)
+            hold = (Support("x-", {"x": 0.0}), Support("y-", {"y": 0.0})) if cut else ()
+            if name == "lower":
+                hold = (*hold, Support("bottom"))
+                parts.append(Part(name, mesh, MATERIAL, hold, contact="top"))
+                continue
+            bent = 0.02 * (mesh.p[0] ** 2 + mesh.p[1] ** 2 / 2)
+            mesh = replace(mesh, doflocs=mesh.p + np.outer([0, 0, 1], bent))
+            load = (Traction("pressed", (0.0, 0.0, -1.0)),)
+            parts.append(Part(name, mesh, MATERIAL, hold, load, contact="bottom"))
+        pair = Contact("upper", "lower", 0.3, coupling="mortar", carrier=carrier)
+        scene = Scene("plates", bodies=tuple(parts), contacts=(pair,), kind="solid", degree=1)
+        problem = reduce(replace(scene, copies=4 if cut else 1))
+        r = solve(problem, tol=1e-12).reactions / problem.areas[:, None]
+        at = np.round(problem.coordinates, 9) + 0.0
+        kept = np.flatnonzero(np.all(at[:2] >= 0, axis=0))
+        order = kept[np.lexsort(at[:2, kept])]
+        results.append(np.stack([r[order, 0], np.linalg.norm(r[order, 1:], axis=1)]))
+    whole, quarter = results
+    assert np.allclose(whole, quarter, atol=1e-9 * whole.max())
 
 
 @pytest.mark.parametrize("degree", [1, 2])
@@ -664,10 +701,7 @@ def test_a_quarter_of_a_press_fit_is_half_of_a_half(degree, carrier):
         results.append(solution.reactions[order] / problem.areas[order, None])
         assert solution.reactions[order[0], 0] > 0 and solution.reactions[order[0], 1] == 0
     quarter, half = results
-    close = {1: 0.05, 2: 1e-9}[
-        degree
-    ]  # at an end the kinks of linear elements are rounded off by the nodes on one side
-    assert np.allclose(quarter, half, atol=close * np.abs(half).max())
+    assert np.allclose(quarter, half, atol=1e-9 * np.abs(half).max())
 
 
 def test_a_small_block_on_a_large_one():

@@ -72,6 +72,22 @@ def test_a_scene_in_which_nothing_pushes():
     )
 
 
+def test_a_load_that_is_taken_off_leaves_no_forces_and_no_remark(tmp_path):
+    """After friction rounding of the last slip is no overlap."""
+    (tmp_path / "s.toml").write_text(
+        'units = { length = "mm", stress = "MPa" }\n[bodies.pad]\ncontact = "y-"\n'
+        "block = { x = [0, 20], y = [0, 10], elements = [8, 4] }\n"
+        'material = { E = 1000, nu = 0.3 }\nsupports = [{ boundary = "x-", x = 0 }]\n'
+        'pressures = [{ boundary = "y+", pressure = [10, 20, 0] }]\n[bodies.floor]\nrigid = {}\n'
+        '[[contacts]]\nupper = "pad"\nlower = "floor"\nmu = 0.3\n'
+    )
+    states = read_scene_file(tmp_path / "s.toml").states
+    assert not check_scene(states).notes
+    result = run(tmp_path / "s.toml", figures=())
+    assert result.summary["remarks"] == [] and not np.any(result.solution.reactions)
+    assert result.path.history["friction_work"][1] > 0
+
+
 WRONG = {
     "load on the contact": (dict(load=("low", -10.0)), "the traction on 'low' of body 'one'"),
     "E in Pa": (dict(materials=(Material(210e9, 0.3),) * 2), "stiffer than diamond"),

@@ -247,7 +247,7 @@ MISTAKES = [
         "x = 1.0, y = -10.0",
         "x = [1, 2], y = [3, 4, 5]",
         9,
-        "'x' has values for 2 states .* others? .*3",
+        "'x' has values for 2 states, other.* 3",
     ),
     ("x = 1.0, y", "x = [], y", 9, "empty array"),
     ("force = { x = 1.0, y = -10.0 }", "glued = 1", 9, "a plate needs force"),

@@ -4,11 +4,23 @@ once gave.
 
 import os
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from contactopt import InputError, InterfaceProblem, Material, fclib, follow, reduce, run, solve
+from contactopt import (
+    InputError,
+    InterfaceProblem,
+    Material,
+    all_solutions,
+    diagnose,
+    fclib,
+    follow,
+    reduce,
+    run,
+    solve,
+)
 from contactopt.cli import main
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.scenes import cattaneo, flat_punch
@@ -239,6 +251,18 @@ def test_choices_that_there_are_not(choice):
 def test_units_are_two_names(units):
     with pytest.raises(InputError, match="unit"):
         replace(flat_punch(2, elements=4), units=units)
+
+
+@pytest.mark.parametrize("function", [solve, all_solutions, diagnose, run, reduce, follow])
+@pytest.mark.parametrize("given", [None, 3, [], {}, "no-such", Path(__file__)])
+def test_what_is_no_problem_or_scene(function, given):
+    with pytest.raises(InputError, match=r"InterfaceProblem|[Ss]cene"):
+        function(given)
+
+
+def test_a_list_of_scenes_is_a_path():
+    with pytest.raises(InputError, match=r"got list. contactopt.follow solves"):
+        run([flat_punch(2, elements=4)])
 
 
 def test_a_path_of_other_meshes_is_refused():

@@ -51,7 +51,8 @@ and so that the answer does not depend on the choice.
 **Planes of symmetry.** At a contact in such a plane the model holds one half of the faces around
 it. What the whole would give is the sum with the mirror image: normals, gaps and levers have no
 component out of the plane, and the mean rotation none about axes in it (Faces.mirror). Otherwise a
-gap that closes along the plane would also be a slip, and raise friction.
+gap that closes along the plane would also be a slip, and raise friction. The rounding of kinks fits
+the nodes of the image, too.
 
 **Contacts that are supported.** Where a support holds a component at a contact's node, that
 component of u_i is taken from this node alone, and from the other body at the place that faces it
@@ -80,7 +81,7 @@ from contactopt.bodies.elements import FACES, weight_at
 from contactopt.checks import place_words
 from contactopt.coupling.faces import NEWTON, Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
-from contactopt.coupling.mortar_matrices import collect, integrate, tidy
+from contactopt.coupling.mortar_matrices import Integrals, collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -103,6 +104,8 @@ class Mortar:
     share    (k,) the areas over those of the faces: less than one where the other surface ends
     weights  two (k, nodes of the body): what the displacement of the nodes contributes to that of
              the contacts
+    across   [c] (k, nodes of the other body): what is added to its weights in component c; empty
+             where there is no plane of symmetry
     alone    two (k, nodes of the body): the displacement at the contact's own node, and at the
              place facing it
     lever    (dim, k) l_i, from the other body to the own one [length]; zero where the surfaces lie
@@ -121,6 +124,7 @@ class Mortar:
     weights: tuple[sp.csr_matrix, sp.csr_matrix]
     alone: tuple[sp.csr_matrix, sp.csr_matrix]
     lever: np.ndarray
+    across: list[sp.csr_matrix]
     carried: list[list[sp.csr_matrix]]
 
     def components(self, body: int, held: np.ndarray) -> list[list[sp.csr_matrix]]:
@@ -130,9 +134,10 @@ class Mortar:
         At the contacts' nodes on the own body supports hold the components `held` (dim, k).
         """
         dim = len(self.lever)
-        W, alone = self.weights[body], self.alone[body]
-        made = [[sp.csr_matrix(W.shape)] * dim for _ in range(dim)]
-        for c in range(dim):
+        plain, alone = self.weights[body], self.alone[body]
+        made = [[sp.csr_matrix(plain.shape)] * dim for _ in range(dim)]
+        added = self.across if body != self.own else []
+        for c, W in enumerate([plain + more for more in added] or [plain] * dim):
             made[c][c] = W - sp.diags(held[c].astype(float)) @ (W - alone) if held[c].any() else W
             if body == self.own and self.carried:
                 free = sp.diags((~held[c]).astype(float))
@@ -170,7 +175,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     nodes = sums.nodes
     # Normals are always those of the lower body: its own at its nodes, or as they are seen from the
     # contacts.
-    n = mine.mirrored(normals[:, nodes] if first == 1 else _seen(theirs, sums.other), nodes)
+    n = mine.mirrored(normals[:, nodes] if first == 1 else _seen(theirs, sums), nodes)
     n = n / np.linalg.norm(n, axis=0)
     up = -n if first == 1 else n  # along which x - x' opens the gap
     # The gap is the part of the mean vector along the normal, positive where the bodies are apart.
@@ -179,8 +184,8 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     if not mine.weight[1]:
         # e_i = W x - W' x', the vector between the places where the two forces of a contact act,
         # and its lever.
-        e = sums.own @ mine.points.T - sums.other @ theirs.points.T
-        lever = levers(mine.mirrored(e.T, nodes), up, gap, sizes[nodes])
+        e = (sums.own @ mine.points.T).T - _at_contacts(sums, theirs.points)
+        lever = levers(mine.mirrored(e, nodes), up, gap, sizes[nodes])
     carried = rotations_times(lever, mine, nodes) if np.any(lever) else []
     x = mine.points[:, nodes]
     fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, nodes]
@@ -193,18 +198,28 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     if first == 1:
         weights, alone = weights[::-1], alone[::-1]
     share = sums.areas / sums.full
-    return Mortar(first, nodes, sums.areas, n, gap, x, share, weights, alone, lever, carried)
+    return Mortar(
+        first, nodes, sums.areas, n, gap, x, share, weights, alone, lever, sums.across, carried
+    )
 
 
-def _seen(other: Faces, weights: sp.csr_matrix) -> np.ndarray:
-    """Unit normals (dim, k) of the other side at the contacts, by their weights (k, nodes)."""
+def _at_contacts(sums: Integrals, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (dim, k) at the contacts from those (dim, n) at the nodes of the other side."""
+    seen = (sums.other @ vectors.T).T
+    for c, more in enumerate(sums.across):
+        seen[c] += more @ vectors[c]
+    return np.asarray(seen)
+
+
+def _seen(other: Faces, sums: Integrals) -> np.ndarray:
+    """Unit normals (dim, k) of the other side at the contacts."""
     normals = contact_normals(other)[0]
     # nodes that are no vertices of linear cells
     between = np.setdiff1d(np.arange(other.faces.shape[1]), other.cells)
     hats = evaluate(FACES[other.kind][1], other.places[:, between])[0]
     normals[:, other.faces[:, between]] = normals[:, other.faces[:, : other.corners]] @ hats
-    n = weights @ normals.T
-    return np.asarray((n / np.linalg.norm(n, axis=1)[:, None]).T)
+    n = _at_contacts(sums, normals)
+    return np.asarray(n / np.linalg.norm(n, axis=0))
 
 
 def _contacts(surface: Faces, faces: np.ndarray) -> int:
@@ -240,6 +255,8 @@ def contact_normals(surface: Faces) -> tuple[np.ndarray, np.ndarray, np.ndarray]
             for d in range(len(total)):
                 total[d] += np.bincount(node, split[d] @ (dual[v] * share), n)
     total = surface.mirrored(total)
+    if surface.mirror is not None:
+        area *= 2.0 ** surface.mirror.sum(axis=0)  # with the images of the cells
     long = np.linalg.norm(total, axis=0)
     normals = np.divide(total, long, where=area > 0, out=np.zeros_like(total))
     return normals, area ** (1 / (surface.dim - 1)), full

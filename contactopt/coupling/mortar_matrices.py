@@ -38,6 +38,8 @@ class Integrals:
              put it, not at its node
     own      (k, nodes of the own body) and
     other    (k, nodes of the other body): weights W and W' with unit row sums
+    across   [c] (k, nodes of the other body): what is added to W' for component c of a
+             displacement at planes of symmetry; empty without them (rounded_kinks)
     apart    (dim, k) weighted vector from the other true surface to the own one [length]
     least    least distance of the true surfaces at a point of integration [length], negative where
              they overlap
@@ -50,6 +52,7 @@ class Integrals:
     partial: np.ndarray
     own: sp.csr_matrix
     other: sp.csr_matrix
+    across: list[sp.csr_matrix]
     apart: np.ndarray
     least: float
     nearest: np.ndarray
@@ -69,6 +72,7 @@ def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> In
     W = [sp.csr_matrix((k, side.points.shape[1])) for side in sides]
     apart = np.zeros((own.dim, k))
     rounding = Rounding(other, points) if other.degree == 1 else None
+    across = [sp.csr_matrix(W[1].shape) for _ in (rounding.across if rounding else ())]
     least, nearest = np.inf, np.zeros(own.dim)
     for start in range(0, len(points.cell), BLOCK):
         block = slice(start, start + BLOCK)
@@ -87,6 +91,7 @@ def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> In
             shape = k, rounding.rises.shape[0]
             term = collect(values, row, rounding.columns(block, pairs), shape)
             W[1] = W[1] + term @ rounding.rises
+            across = [there + term @ more for there, more in zip(across, rounding.across)]
         vector = places[0] - places[1]
         # The deepest overlap of the surfaces, for a message.
         distance = -np.sum(vector * own.normals(faces[0], points.at[:, block]), axis=0)
@@ -96,7 +101,9 @@ def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> In
         for d in range(own.dim):
             apart[d] += np.bincount(row.ravel(), means[:, :, d].ravel(), k)
     mine, theirs = (tidy(sp.diags(1 / areas) @ part) for part in W)
-    return Integrals(nodes, areas, full, partial, mine, theirs, apart / areas, least, nearest)
+    across = [sp.csr_matrix(sp.diags(1 / areas) @ part) for part in across]
+    apart = apart / areas
+    return Integrals(nodes, areas, full, partial, mine, theirs, across, apart, least, nearest)
 
 
 class _Dual:

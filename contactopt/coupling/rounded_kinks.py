@@ -14,6 +14,10 @@ not at all. The mean is that over the covered part of the face, so that a unifor
 gives every node exactly the integral of its shape function. Since all is linear in the
 displacements of the nodes, forces follow by transposition, and remain in equilibrium.
 
+Beyond a plane of symmetry the surface goes on as its mirror image, and the fits use its nodes, too.
+Components along the plane are there what they are on this side; the one across it is opposite about
+its value in the plane, so that a rigid motion remains one. The rises then depend on the component.
+
 Source of the recovery: Zhang, Naga (2005), A new finite element gradient recovery method:
 superconvergence property, SIAM J. Sci. Comput. 26, 1192-1213.
 """
@@ -22,6 +26,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import KDTree
 
 from contactopt.coupling.faces import Faces
 from contactopt.coupling.segments import Overlap
@@ -34,14 +39,16 @@ class Rounding:
     """The rounding of the displacement of a surface of linear elements, at the points of
     integration of an overlap.
 
-    rises  (f e, n) from the nodes' values to m_e of the edges of every face
+    rises   (f e, n) from the nodes' values to m_e of the edges of every face
+    across  [c] (f e, n): what is added to `rises` for component c of a displacement, which a plane
+            of symmetry turns round; empty without such a plane
     """
 
     def __init__(self, surface: Faces, points: Overlap) -> None:
         c = surface.corners
         self.edges = np.array([(i, (i + 1) % c) for i in range(c if c > 2 else 1)])
         self.surface, self.points = surface, points
-        self.rises = _rises(surface, self.edges)
+        self.rises, self.across = _rises(surface, self.edges)
         count = len(surface.faces)
         content = np.bincount(points.face, points.measure, count)
         bubbles = self._bubbles(points.there) * points.measure
@@ -65,39 +72,72 @@ class Rounding:
         return np.asarray(4 * first * second / np.where(both > 0, both, 1.0))
 
 
-def _rises(surface: Faces, edges: np.ndarray) -> sp.csr_matrix:
-    """(f e, n) from the nodes' values to m_e; zero where a gradient is unknown."""
-    gradients = _gradients(surface)
+def _rises(surface: Faces, edges: np.ndarray) -> tuple[sp.csr_matrix, list[sp.csr_matrix]]:
+    """`rises` and `across` of the edges of a surface; zero where a gradient is unknown."""
+    points, faces, even, odd = _with_images(surface)
+    gradients = _gradients(points, faces, np.unique(surface.faces))
     a, b = (surface.faces[:, edges[:, i]].ravel() for i in (0, 1))
     along = (surface.points[:, b] - surface.points[:, a]) / 8
     determined = np.asarray(sum(np.diff(G.indptr) for G in gradients) > 0)
     known = sp.diags((determined[a] & determined[b]).astype(float))
-    rises = sum(sp.diags(step) @ (G[a] - G[b]) for step, G in zip(along, gradients))
-    return sp.csr_matrix(known @ rises)
+    rises = known @ sum(sp.diags(step) @ (G[a] - G[b]) for step, G in zip(along, gradients))
+    return sp.csr_matrix(rises @ even), [sp.csr_matrix(rises @ (E - even)) for E in odd]
 
 
-def _gradients(surface: Faces) -> list[sp.csr_matrix]:
-    """Matrices (n, n), one for each component of space, from the nodes' values to the tangential
-    gradient; empty rows where too few others surround a node.
+def _with_images(
+    surface: Faces,
+) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix, list[sp.csr_matrix]]:
+    """Points (dim, m) and faces of a surface with its mirror images; the matrix (m, n) from the
+    nodes' values to those of all points, where they are the same on both sides of every plane; and
+    for each component of a displacement the one that is right for it.
     """
-    n, (f, j) = surface.points.shape[1], surface.faces.shape
-    at = surface.faces.ravel(), np.repeat(np.arange(f), j)
+    points, faces, mirror = surface.points, surface.faces, surface.mirror
+    even = sp.identity(points.shape[1], format="csr")
+    if mirror is None:
+        return points, faces, even, []
+    odd = [even] * surface.dim
+    for c in range(surface.dim):
+        count, nodes = points.shape[1], np.unique(faces)
+        within, beside = nodes[mirror[c, nodes]], nodes[~mirror[c, nodes]]
+        if not len(within):
+            continue
+        foot = within[KDTree(points[:, within].T).query(points[:, beside].T)[1]]
+        image = np.arange(count)
+        image[beside] = count + np.arange(len(beside))
+        beyond = points[:, beside]
+        beyond[c] = 2 * points[c, foot] - beyond[c]
+        points, mirror = np.hstack([points, beyond]), np.hstack([mirror, mirror[:, beside]])
+        faces = np.vstack([faces, image[faces]])
+        odd = [
+            sp.vstack([E, 2 * E[foot] - E[beside] if d == c else E[beside]], format="csr")
+            for d, E in enumerate(odd)
+        ]
+        even = sp.vstack([even, even[beside]], format="csr")
+    return points, faces, even, odd
+
+
+def _gradients(points: np.ndarray, faces: np.ndarray, wanted: np.ndarray) -> list[sp.csr_matrix]:
+    """Matrices (n, n), one for each component of space, from the nodes' values to the tangential
+    gradient at the nodes `wanted`; empty rows elsewhere, and where too few others surround a node.
+    """
+    (dim, n), (f, j) = points.shape, faces.shape
+    at = faces.ravel(), np.repeat(np.arange(f), j)
     incident = sp.csr_matrix((np.ones(f * j), at), (n, f))
     near = sp.csr_matrix(incident @ incident.T)
-    terms = 3 if surface.dim == 2 else 6
+    terms = 3 if dim == 2 else 6
     wider = sp.csr_matrix(near @ near)
-    few = np.diff(near.indptr) < (terms if surface.dim == 2 else terms + 2)
+    few = np.diff(near.indptr) < (terms if dim == 2 else terms + 2)
     rows, columns, values = [], [], []
-    for node in np.unique(surface.faces):
+    for node in wanted:
         graph = wider if few[node] else near
         around = graph.indices[graph.indptr[node] : graph.indptr[node + 1]]
-        fit = _fit(surface.points[:, around] - surface.points[:, [node]], surface.dim - 1, terms)
+        fit = _fit(points[:, around] - points[:, [node]], dim - 1, terms)
         if fit is not None:
             rows.append(np.full(len(around), node))
             columns.append(around)
             values.append(fit)
     if not rows:
-        return [sp.csr_matrix((n, n))] * surface.dim
+        return [sp.csr_matrix((n, n))] * dim
     index = np.concatenate(rows), np.concatenate(columns)
     return [sp.csr_matrix((value, index), (n, n)) for value in np.concatenate(values, axis=1)]
 

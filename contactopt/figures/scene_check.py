@@ -90,7 +90,7 @@ def check_scene(
     notes = [
         *told,
         *_balance(states, made, free),
-        *doubts(scene, made.couplings, made.planes),
+        *doubts(scene, made.couplings, made.planes, states),
         *coupled,
     ]
     length, stress = scene.units

@@ -21,6 +21,7 @@ import numpy as np
 
 from contactopt.errors import Damaged, InputError
 from contactopt.meshes.inp_elements import CORNERS
+from contactopt.meshes.inp_text import text_of
 
 # card -> shape by its number of nodes
 _SHAPES = (
@@ -160,10 +161,7 @@ class _Reader:
 
 def _cards(path: Path) -> Iterator[Card]:
     """Line and fields of each card of the bulk data, with the lines in which it goes on."""
-    data = path.read_bytes()
-    if b"\0" in data:
-        raise Damaged("it is no text")
-    lines = data.decode("latin-1").splitlines()
+    lines = text_of(path).splitlines()
     begin = [n for n, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
     if len(begin) > 1:
         raise InputError(f"mesh file '{path}', line {begin[1] + 1}: it holds more than one BEGIN.")

@@ -219,17 +219,21 @@ def harmless() -> frozenset[str]:
 
 def _lines(path: Path) -> list[tuple[int, str]]:
     """Number and text of the lines that are neither empty nor comments, the last one first."""
+    text = text_of(path).rstrip("\x1a")  # the end of a file in DOS
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    found = ((number, line.strip()) for number, line in enumerate(lines, 1))
+    return [(n, line) for n, line in found if line and not line.startswith("**")][::-1]
+
+
+def text_of(path: Path) -> str:
+    """The text of a file in UTF-8 or, where it is not that, in Latin-1."""
     data = path.read_bytes()
     if b"\0" in data:
         raise Damaged("it is no text")
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    text = text.rstrip("\x1a")  # the end of a file in DOS
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    found = ((number, line.strip()) for number, line in enumerate(lines, 1))
-    return [(n, line) for n, line in found if line and not line.startswith("**")][::-1]
+        return data.decode("latin-1")
 
 
 def _words(text: str) -> list[str]:

@@ -26,7 +26,7 @@ from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
 from contactopt.meshes.med import read_med
 from contactopt.meshes.medit import read_medit
-from contactopt.meshes.msh4 import parametric, read_msh4, read_parametric, version, without_views
+from contactopt.meshes.msh import read_msh2, read_msh4, version
 from contactopt.meshes.su2 import read_su2
 
 MOST_BYTES = 4_000_000_000  # bytes: a larger file holds more than can be solved
@@ -46,12 +46,14 @@ OWN: dict[str, Callable[[Path], Any]] = {
     "nastran": read_bulk_data,
     "su2": read_su2,
 }
-PATIENCE = 30.0, 1e-6  # seconds that any other reader gets, and more per byte
+PATIENCE = 30.0, 1e-4  # seconds that any other reader gets, and more per byte
+WORK = 4.0, 1e-5  # seconds of the processor that it gets: some never end on a file that ends early
 MEMORY = 4_000_000_000, 50  # bytes that such a reader gets, and more per byte
 CHILD = """import contextlib, pickle, sys, meshio
 with contextlib.suppress(ImportError):  # not on Windows
     import resource
     resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]), int(sys.argv[3])))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[4]), int(sys.argv[4]) + 1))
 with contextlib.redirect_stdout(sys.stderr):
     mesh = meshio.read(sys.argv[1], file_format=sys.argv[2])
 pickle.dump(mesh, sys.stdout.buffer)"""
@@ -171,7 +173,7 @@ def _words(error: BaseException, printed: str) -> str:
 
     text = ""
     if isinstance(error, Damaged | meshio.ReadError):
-        text = str(error)
+        text = str(error).partition("Error: Couldn't read file")[0]
     elif isinstance(error, SystemExit):
         text = printed
     elif isinstance(error, KeyError):
@@ -181,22 +183,14 @@ def _words(error: BaseException, printed: str) -> str:
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[], Any]]:
     """The reader of each attempt."""
-    stated, binary = version(path) if "gmsh" in formats else (None, False)
-    if stated is not None and stated != "4.1" and stated.partition(".")[0] != "2":
-        raise InputError(
-            f"mesh file '{path}' is of version {stated} of"
-            " Gmsh's format; save it in version 4.1 or 2.2."
-        )
-    if stated == "4.1":
-        yield partial(read_msh4, path)
-        return
-    if stated is not None and parametric(path):
-        yield partial(read_parametric, path)
-        return
+    stated = version(path)[0] if "gmsh" in formats else None
     if stated is not None:
-        with without_views(path) as bare:
-            # meshio trusts the counts of damaged binary files
-            yield partial(_read_apart if binary else _read_here, bare, "gmsh", size)
+        if stated != "4.1" and stated.partition(".")[0] != "2":
+            raise InputError(
+                f"mesh file '{path}' is of version {stated} of"
+                " Gmsh's format; save it in version 4.1 or 2.2."
+            )
+        yield partial(read_msh4 if stated == "4.1" else read_msh2, path)
         return
     for name in sorted(formats, key=lambda name: name not in SAFE):
         if name in OWN and path.suffix != ".meshb":
@@ -215,12 +209,16 @@ def _read_here(path: Path, name: str, size: int) -> Any:
 
 def _read_apart(path: Path, name: str, size: int) -> Any:
     """The mesh, read by a process that is stopped if it takes too long."""
-    memory, patience = MEMORY[0] + MEMORY[1] * size, PATIENCE[0] + PATIENCE[1] * size
-    command = [sys.executable, "-c", CHILD, str(path), name, str(memory)]
+    memory, patience, work = (first + more * size for first, more in (MEMORY, PATIENCE, WORK))
+    limits = str(int(memory)), str(int(work))
+    command = [sys.executable, "-c", CHILD, str(path), name, *limits]
     try:
         done = subprocess.run(command, capture_output=True, timeout=patience, check=False)
     except subprocess.TimeoutExpired as error:
         raise Damaged(f"no end after {patience:.0f} s") from error
+    if done.returncode < 0:  # stopped by the system
+        raise Damaged(f"no end after {work:.0f} s")
     if done.returncode:
-        raise Damaged(done.stderr.decode(errors="replace").rpartition("ReadError: ")[2])
+        _, found, said = done.stderr.decode(errors="replace").rpartition("ReadError: ")
+        raise Damaged(said if found else "")  # without it there are words of Python only
     return pickle.loads(done.stdout)

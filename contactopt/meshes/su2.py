@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import Damaged, InputError
+from contactopt.meshes.inp_text import text_of
 
 KINDS = {3: ("line", 2), 5: ("triangle", 3), 9: ("quad", 4), 10: ("tetra", 4)}
 KINDS |= {12: ("hexahedron", 8), 13: ("wedge", 6), 14: ("pyramid", 5)}
@@ -23,7 +24,7 @@ def read_su2(path: Path) -> Any:
     """
     import meshio
 
-    text = (line.split("%")[0].strip() for line in path.read_text("latin-1").splitlines())
+    text = (line.split("%")[0].strip() for line in text_of(path).splitlines())
     lines = [(number, line) for number, line in enumerate(text, 1) if line][::-1]
     rows: dict[str, list[list[int]]] = {kind: [] for kind, _ in KINDS.values()}
     sets: dict[str, dict[str, list[int]]] = {}

@@ -40,6 +40,7 @@ from contactopt.problem import (
     Solution,
     amplification,
     balance_residual,
+    check_problem,
     dimensionless,
     natural_map_residual,
 )
@@ -183,6 +184,7 @@ def diagnose(problem: InterfaceProblem, solution: Solution | None = None) -> Dia
     InputError : for laws without a friction coefficient, if the solution does not solve this
         problem, or if the load pulls the bodies apart
     """
+    check_problem(problem)
     if not problem.law.proportional or problem.law.dilatant:
         raise InputError(
             "diagnose asks what a friction coefficient does, so it needs Coulomb's law or bilateral"

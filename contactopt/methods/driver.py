@@ -34,6 +34,7 @@ from contactopt.problem import (
     Scales,
     Solution,
     Status,
+    check_problem,
     dimensionless,
     infeasibility,
     isotropic,
@@ -102,6 +103,7 @@ def solve(
     InputError : on arguments that make no sense, an unknown or missing backend, a method that does
         not solve the problem's law, or a load that pulls the bodies apart
     """
+    check_problem(problem)
     check_number("tol", tol, low=0.0)
     check_number("max_iterations", max_iterations, low=0.0)
     if change_tol is not None:
@@ -345,6 +347,8 @@ class _Recorder:
     def record(self, iterate: Iterate | Known, counts: dict[str, float]) -> Status | None:
         """Take one iterate (dimensionless); the status with which the solve ends, or None."""
         r, lam, *known = iterate
+        if np.abs(r).max(initial=0.0) <= np.finfo(float).eps:
+            r = np.zeros_like(r)  # rounding beside the unit of force, as after a load is taken off
         self.lost = bool(max(np.abs(r).max(initial=0.0), np.abs(lam).max(initial=0.0)) > LOST)
         previous, limits = self.reactions, self.limits
         self.reactions, self.multipliers = self.scales.to_physical(r, lam)

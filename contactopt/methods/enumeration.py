@@ -22,6 +22,7 @@ from contactopt.problem import (
     InterfaceProblem,
     Solution,
     Status,
+    check_problem,
     dimensionless,
     natural_map_residual,
 )
@@ -46,6 +47,7 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
     ------
     InputError : in 3D, for other laws, and for more than 24 contacts
     """
+    check_problem(problem)
     check_number("limit", limit, low=0.0)
     if not can(problem) or problem.dim != 2 or problem.contacts > MOST_CONTACTS:
         raise InputError(

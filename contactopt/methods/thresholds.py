@@ -170,9 +170,9 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray, energy: bool) -> T
 
 def check_definite(A: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """A, if its symmetric part is positive definite far above the rounding of another matrix;
-    LinAlgError if not.
+    LinAlgError if not. That of no size is.
     """
-    least = la.eigvalsh((A + A.T) / 2, subset_by_index=(0, 0))[0]
+    least = np.inf if not A.size else la.eigvalsh((A + A.T) / 2, subset_by_index=(0, 0))[0]
     if least <= DEFINITE * np.abs(beside).max(initial=0.0):
         raise la.LinAlgError("not definite")
     return A

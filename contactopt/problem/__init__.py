@@ -9,7 +9,7 @@ from contactopt.problem.certificate import (
 )
 from contactopt.problem.chart import Chart, Pair
 from contactopt.problem.feasibility import Infeasible, infeasibility
-from contactopt.problem.interface_problem import InterfaceProblem
+from contactopt.problem.interface_problem import InterfaceProblem, check_problem
 from contactopt.problem.laws import LAWS
 from contactopt.problem.laws.law import Law
 from contactopt.problem.pairs import alone, part_of
@@ -29,6 +29,7 @@ __all__ = [
     "alone",
     "amplification",
     "balance_residual",
+    "check_problem",
     "dimensionless",
     "fit_multipliers",
     "infeasibility",

@@ -265,6 +265,15 @@ class InterfaceProblem:
         return (self.Q @ reactions.ravel() + self.V @ multipliers).reshape(self.q.shape) + self.q
 
 
+def check_problem(problem: object) -> None:
+    """Raise InputError for what is no interface problem, such as a scene."""
+    if not isinstance(problem, InterfaceProblem):
+        raise InputError(
+            f"the problem must be an InterfaceProblem, not {type(problem).__name__};"
+            " contactopt.reduce makes one of a scene."
+        )
+
+
 def _shaped(name: str, value: ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
     """The value as a real finite array of its own, of that shape."""
     array = real_array(name, value)

@@ -152,11 +152,12 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _closing(problem: InterfaceProblem) -> float:
-    """Root mean square of the overlaps at r = 0; without any, of the least |q_i| > 0."""
-    normal = problem.q[:, 0]
+    """Root mean square of the overlaps at r = 0; without any, the least |q_i|. Those that are
+    rounding beside the largest one do not count.
+    """
+    normal, sizes = problem.q[:, 0], np.linalg.norm(problem.q, axis=1)
     overlap = np.where(problem.law.lowest < 0, np.abs(normal), -normal)
-    overlap = overlap[overlap > 0]
-    if len(overlap):
-        return float(np.sqrt(np.mean(overlap**2)))
-    sizes = np.linalg.norm(problem.q, axis=1)
-    return float(sizes[sizes > 0].min(initial=np.inf)) if np.any(sizes > 0) else 0.0
+    least = NOISE * sizes.max(initial=0.0)
+    if np.any(overlap > least):
+        return float(np.sqrt(np.mean(overlap[overlap > least] ** 2)))
+    return float(sizes[sizes > least].min()) if np.any(sizes > least) else 0.0

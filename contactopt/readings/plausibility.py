@@ -26,36 +26,40 @@ FAINT = 1e-9  # stress of a load over Young's modulus: no load on a solid strain
 STIFFER = 3e5  # ratio of Young's moduli: that of steel to soft rubber is 1e5
 LARGER = 300.0  # ratio of sizes: metres beside millimetres, of bodies up to three times as large
 
+UNPUSHED = (
+    "nothing pushes the bodies: there is no load, no displacement of a support and no overlap;"
+    " is a load missing?"
+)
+
 
 def doubts(
-    scene: Scene, couplings: Sequence[Coupling], planes: Sequence[SymmetryPlane]
+    scene: Scene,
+    couplings: Sequence[Coupling],
+    planes: Sequence[SymmetryPlane],
+    states: Sequence[Scene] = (),
 ) -> list[str]:
     """One sentence for everything about a scene that is probably not as it is meant; `planes` are
-    those of symmetry.
+    those of symmetry, `states` the scenes of its load path, if it has one.
     """
     meshed = [part for part in scene.meshed.values() if part.given]
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]
     found += [note for part in meshed for note in _faint_loads(scene, part)]
     found += [note for part in meshed for note in _pointed(part)]
-    found += _unloaded(scene, couplings)
+    if not any(_pushed(state, couplings) for state in states or (scene,)):
+        found.append(UNPUSHED)
     found += _missing_planes(scene, planes)
     return [*found, *_stiffness(scene), *_sizes(scene), *_gaps(scene, couplings)]
 
 
-def _unloaded(scene: Scene, couplings: Sequence[Coupling]) -> list[str]:
-    """A scene in which nothing pushes."""
+def _pushed(scene: Scene, couplings: Sequence[Coupling]) -> bool:
+    """Whether loads, supports or an overlap push the bodies of a scene."""
     given: list[Any] = []
     for part in scene.parts:
         given += [load.values(scene.components) for load in getattr(part, "loads", ())]
         given += [support.displacement for support in getattr(part, "supports", ())]
         given += [getattr(part, name, None) for name in ("force", "displacement")]
     values = [list(own.values()) if isinstance(own, Mapping) else own for own in given]
-    if any(np.any(own) for own in values) or any(np.any(own.gap < 0) for own in couplings):
-        return []
-    return [
-        "nothing pushes the bodies: there is no load, no displacement of a support and no overlap;"
-        " is a load missing?"
-    ]
+    return any(np.any(own) for own in values) or any(np.any(own.gap < 0) for own in couplings)
 
 
 def _missing_planes(scene: Scene, planes: Sequence[SymmetryPlane]) -> list[str]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, at_line, change, read_table
 from contactopt.problem.laws import LAWS
@@ -90,15 +91,15 @@ def read_scenes(
     wanted = len(reading.steps) or longest
     for length, at, key in reading.lengths:
         if length not in (1, wanted):
-            what = "states of the load path, other numbers for"
-            what = "steps, but there are" if reading.steps else what
-            raise at.fail(f"{key!r} has values for {length} {what} {wanted}.", key)
-    count = sum(states for _, states in reading.steps) or longest
+            what, whose = ("step", "steps") if reading.steps else ("state", "other numbers")
+            said = f"{key!r} has values for {count(length, what)}, {whose} for {wanted}."
+            raise at.fail(said, key)
+    total = sum(states for _, states in reading.steps) or longest
     states = [first]
-    for state in range(1, count):
+    for state in range(1, total):
         reading.state = state
         states.append(_scene(path, table(), reading)[0])
-    if count > 1 and "accuracy" in solve:
+    if total > 1 and "accuracy" in solve:
         raise top.fail(
             "an accuracy can be asked for only without a load path.", "solve", "accuracy"
         )

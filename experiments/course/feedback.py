@@ -154,7 +154,7 @@ class State:
 
 def _simple(verdict: Verdict) -> Verdict | None:
     """A verdict on numbers, where it is more helpful than one on mechanics."""
-    return verdict if verdict.kind in ("digits", "unit", "half", "right") else None
+    return verdict if verdict.kind in ("digits", "unit", "half", "order", "right") else None
 
 
 @dataclass(frozen=True)

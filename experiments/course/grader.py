@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -117,6 +117,8 @@ def right_answer(number: str) -> Right:
             task.formulas, task.given, task.close, task.least, task.most, task.chapter_text
         )
     found = task.right()
+    if isinstance(found, Numbers):
+        return replace(found, chapter=task.chapter_text)
     plain = isinstance(found, (int, float, tuple, list, np.ndarray))
     return Numbers(found) if plain else found
 

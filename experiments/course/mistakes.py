@@ -48,8 +48,8 @@ OTHERS = {
 MOST_CHANGES, MOST_QUANTITIES = 60, 7
 # an answer fits to a number by chance unless it gives so many digits
 ENOUGH_DIGITS = 4
-ANOTHER = "This is `{}`: that is another quantity."
-# changes that somebody makes less often than others, which explain an answer last
+ANOTHER = "This is the value of `{}`, and another quantity is asked for."
+# changes that somebody makes less often than others, which explain an answer last, and never surely
 SELDOM = ("is squared", "another exponent", "under a square root", "takes the place")
 EXPONENTS = (0.5, 1 / 3, 2 / 3, 2.0, 3.0)
 # what may be done besides to the number that a mistake gives
@@ -60,10 +60,17 @@ BESIDES: tuple[tuple[Callable[[float], float], str], ...] = (
     (lambda x: 1e3 * x, "Besides, look at the units."),
     (lambda x: x / 1e3, "Besides, look at the units."),
     (lambda x: 1 / x, "Besides, it is one over that."),
-    (lambda x: 1 - x, "Besides, it is one minus that."),
-    (lambda x: x * x, "Besides, it is squared."),
-    (lambda x: abs(x) ** 0.5, "Besides, it is under a square root."),
 )
+# what a quantity is taken for: its half or double, or a number with the point in a wrong place
+TAKEN = (
+    (2.0, "twice as large"),
+    (0.5, "half as large"),
+    *(
+        (10.0**n, "in another unit, or with its point in a wrong place")
+        for n in (-3, -2, -1, 1, 2, 3)
+    ),
+)
+WRONG_SIDE = "`{}` stands on the wrong side of a fraction"
 
 
 def value(formula: str, given: dict[str, float]) -> float:
@@ -89,19 +96,21 @@ def wrong_values(formula: str, given: Given, chapter: Given = ()) -> Found:
     """
     known, tree = dict(given), ast.parse(formula, mode="eval").body
     inside = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    tried = [(node, known, f"This comes out if {words}.") for node, words in changed(tree, known)]
-    tried.sort(key=lambda one: max(SELDOM.index(w) + 1 if w in one[2] else 0 for w in SELDOM))
+    tried = [(node, known, words) for node, words in changed(tree, known)]
+    order = ("wrong side", *SELDOM)
+    tried.sort(key=lambda one: max(order.index(w) + 1 if w in one[2] else 0 for w in order))
     seldom = sum(any(w in words for w in SELDOM) for _, _, words in tried)
     between = [
         (node, known, words) for node, words in (*_everywhere(tree), *_once_more(tree, known))
     ]
     between += [
-        (tree, known | other, words) for other, words in _misread(known, dict(chapter), inside)
+        (tree, known | other, words)
+        for other, words in _misread(known, dict(chapter), inside, formula.startswith("ceil"))
     ]
     steps = [(node, f"This is `{ast.unparse(node)}`, a step on the way.") for node in _steps(tree)]
     between += [(node, known, words) for node, words in steps]
     tried[len(tried) - seldom : len(tried) - seldom] = between
-    found: dict[float, tuple[float, str]] = {}  # by ten digits: the likeliest words stay
+    found: dict[float, tuple[float, list[str]]] = {}  # by ten digits
     right = value(formula, known)
     for node, quantities, words in tried:
         try:
@@ -109,8 +118,29 @@ def wrong_values(formula: str, given: Given, chapter: Given = ()) -> Found:
         except (ArithmeticError, ValueError, TypeError):
             continue
         if np.isfinite(number) and not np.isclose(number, right, rtol=1e-9):
-            found.setdefault(rounded(number, 10), (number, words))
-    return tuple(found.values())
+            found.setdefault(rounded(number, 10), (number, []))[1].append(words)
+    return tuple((number, _told(ways)) for number, ways in found.values())
+
+
+def _told(ways: list[str]) -> str:
+    """The likeliest way to a number, and another one that is as likely and no part of it."""
+    first = ways[0]
+    if first[0].isupper():
+        return first
+    if any(word in first for word in SELDOM):
+        return f"Perhaps {first}: then this comes out."
+    others = [
+        other
+        for other in ways[1:]
+        if not (other[0].isupper() or any(word in other for word in ("all ", *SELDOM)))
+        and not (_subject(first) in _subject(other) or _subject(other) in _subject(first))
+    ]
+    return f"This comes out if {', or if '.join([first, *others[:1]])}."
+
+
+def _subject(words: str) -> str:
+    """The part of a formula that the words are about."""
+    return words.split("`")[-2] if "`" in words else words
 
 
 def _steps(tree: ast.expr) -> list[ast.expr]:
@@ -138,7 +168,7 @@ class _Without(ast.NodeTransformer):
 
 def _everywhere(tree: ast.expr) -> Iterator[tuple[ast.expr, str]]:
     for op, told in ((ast.Pow, "exponents"), (ast.Div, "divisions by a number")):
-        yield _Without(op).visit(deepcopy(tree)), f"This comes out if all {told} are left out."
+        yield _Without(op).visit(deepcopy(tree)), f"all {told} are left out"
 
 
 def _once_more(tree: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr, str]]:
@@ -152,16 +182,10 @@ def _once_more(tree: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.ex
 
 
 def _misread(
-    given: dict[str, float], chapter: dict[str, float], inside: set[str]
+    given: dict[str, float], chapter: dict[str, float], inside: set[str], counts: bool
 ) -> Iterator[tuple[dict[str, float], str]]:
     """Quantities inside a formula that are mistaken wherever they stand, and the mistake in words."""
     given = {name: number for name, number in given.items() if name in inside}
-    for name, number in given.items():
-        yield {name: -number}, f"This comes out if the sign of `{name}` is wrong."
-        yield {name: 0.0}, f"This comes out without `{name}`."
-        yield {name: 1.0}, f"This comes out without `{name}`."
-        if number:
-            yield {name: 1 / number}, f"This comes out if `1 / {name}` takes the part of `{name}`."
     old = {name: number for name, number in chapter.items() if name in given}
     for names in (*((name,) for name in old), tuple(old)):
         told = " and ".join(f"`{name}`" for name in names)
@@ -169,8 +193,27 @@ def _misread(
             {name: old[name] for name in names},
             f"This has the {told} of the text. The exercise gives another number.",
         )
+    for name, number in given.items():
+        yield {name: -number}, f"the sign of `{name}` is wrong"
+        yield {name: 0.0}, f"`{name}` is left out everywhere"
+        yield {name: 1.0}, f"`{name}` is left out everywhere"
+        if number:
+            yield {name: 1 / number}, f"`1 / {name}` takes the part of `{name}`"
+        for one in (1, -1) if counts and number == round(number) else ():
+            yield {name: number + one}, f"`{name}` is one too {'many' if one > 0 else 'few'}"
     for (first, a), (second, b) in combinations(given.items(), 2):
-        yield {first: b, second: a}, f"This comes out if `{first}` and `{second}` are exchanged."
+        yield {first: b, second: a}, f"`{first}` and `{second}` are exchanged"
+
+
+@cache
+def taken(formula: str, given: Given) -> Found:
+    """Numbers that come out if one quantity is taken too large or too small."""
+    known, found = dict(given), []
+    for (factor, told), (name, number) in product(TAKEN, given):
+        wrong = value(formula, known | {name: factor * number})
+        if np.isfinite(wrong):
+            found.append((wrong, f"Perhaps `{name}` is taken {told}: then this comes out."))
+    return tuple(found)
 
 
 def fits(answer: float, number: float) -> bool:
@@ -201,6 +244,11 @@ def changed(node: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr,
             if name in OTHERS:
                 other_name = ast.Name(OTHERS[name], ast.Load())
                 yield ast.Call(other_name, [argument], []), f"`{OTHERS[name]}` replaces `{name}`"
+            if name == "exp":
+                yield (
+                    ast.BinOp(ast.Constant(10.0), ast.Pow(), argument),
+                    "the base is 10, and not `e`",
+                )
             if name in ("sin", "cos", "tan"):
                 turned = ast.BinOp(argument, ast.Mult(), ast.Constant(np.pi / 180))
                 yield ast.Call(node.func, [turned], []), "radians are taken for degrees"
@@ -232,8 +280,8 @@ def _changed_operation(
         case ast.Mult():
             yield left, f"the factor `{second}` is left out"
             yield right, f"the factor `{first}` is left out"
-            yield ast.BinOp(left, ast.Div(), right), f"you divide by `{second}`: multiply by it"
-            yield ast.BinOp(right, ast.Div(), left), f"you divide by `{first}`: multiply by it"
+            yield ast.BinOp(left, ast.Div(), right), WRONG_SIDE.format(second)
+            yield ast.BinOp(right, ast.Div(), left), WRONG_SIDE.format(first)
             yield ast.BinOp(left, ast.Add(), right), f"`{first}` is added to `{second}`: multiply"
             match left, right:
                 case ast.BinOp(a, ast.Add() | ast.Sub(), b), ast.BinOp(c, ast.Add() | ast.Sub(), d):
@@ -242,8 +290,12 @@ def _changed_operation(
                     yield ast.BinOp(terms[0], left.op, terms[1]), told
         case ast.Div():
             yield left, f"the division by `{second}` is left out"
-            yield ast.BinOp(left, ast.Mult(), right), f"you multiply by `{second}`: divide by it"
-            yield ast.BinOp(right, ast.Div(), left), f"`{first}` and `{second}` are exchanged"
+            yield ast.BinOp(left, ast.Mult(), right), WRONG_SIDE.format(second)
+            if first != "1":
+                yield ast.BinOp(right, ast.Div(), left), f"`{first}` and `{second}` are exchanged"
+                inverse = ast.BinOp(ast.Constant(1.0), ast.Div(), right)
+                yield inverse, f"the factor `{first}` is left out"
+                yield ast.BinOp(inverse, ast.Div(), left), WRONG_SIDE.format(first)
             both = ast.BinOp(left, ast.Add(), right)
             yield ast.BinOp(left, op, both), f"you divide by `{first} + {second}`"
         case ast.Pow():
@@ -269,7 +321,7 @@ def two_mistakes(formula: str, given: Given) -> Found:
             except (ArithmeticError, ValueError, TypeError):
                 continue
             if np.isfinite(number):
-                found.append((number, f"This comes out if {first}, and {second}."))
+                found.append((number, f"Perhaps {first}, and {second}: then this comes out."))
     return tuple(found)
 
 
@@ -277,10 +329,15 @@ def two_mistakes(formula: str, given: Given) -> Found:
 def _sums(formula: str, given: Given) -> Found:
     """Sums and differences of a quantity and a quantity, a step of the formula or its value."""
     known, tree = dict(given), ast.parse(formula, mode="eval").body
-    parts = dict(known)
+    parts, found = dict(known), []
+    for (first, a), (second, b) in combinations(known.items(), 2):
+        found += [((a + b) / 2, ANOTHER.format(f"({first} + {second}) / 2"))]
+        if a * b > 0:
+            found += [((a * b) ** 0.5, ANOTHER.format(f"sqrt({first} * {second})"))]
+            harmonic = f"2 * {first} * {second} / ({first} + {second})"
+            found += [(2 * a * b / (a + b), ANOTHER.format(harmonic))]
     for node in (tree, *_steps(tree)):
         parts[ast.unparse(node)] = _value(node, known)
-    found = []
     for (first, a), (second, b) in product(known.items(), parts.items()):
         if first != second:
             found += [(a + b, ANOTHER.format(f"{first} + {second}"))]
@@ -299,6 +356,7 @@ def quantity(answer: float, given: dict[str, float], formula: str) -> str | None
     for number, told in _sums(formula, tuple(known.items())):
         if fits(answer, number):
             return told
+    known = {name: number for name, number in known.items() if abs(number) not in (1.0, 2.0)}
     exponents = (0, 1, -1, 2, -2) if len(known) <= 4 else (0, 1, -1)
     powers = np.array(list(product(exponents, repeat=len(known))))
     powers = powers[np.argsort(abs(powers).sum(axis=1), kind="stable")]

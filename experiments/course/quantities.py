@@ -15,6 +15,7 @@ from experiments.course.mistakes import (
     BESIDES,
     fits,
     quantity,
+    taken,
     two_mistakes,
     value,
     wrong_values,
@@ -22,7 +23,7 @@ from experiments.course.mistakes import (
 from experiments.course.verdict import CLOSE, DIGITS, RIGHT, Verdict, rounded, shortened, wrong
 
 MISSING = "A factor of {} is missing, or one too many."
-UNIT = "Your answer is {:g} times the right one. Look at the units."
+UNIT = "Your answer is {:g} times the right one. Look at the units, or at the decimal point."
 # kind, factor that makes the answer right, and what is told; these come before the formula
 SCALED = (
     ("sign", -1.0, "The size is right, the sign is not. Look at the arrows again."),
@@ -39,6 +40,7 @@ LOST = tuple(
         (10.0, "The decimal point is in a wrong place."),
         (100.0, "The decimal point is in a wrong place, or percent and shares are mixed up."),
         (180 / np.pi, "Radians and degrees are mixed up."),
+        (9.81, "A factor of 9.81 is missing, or one too many: a load in N is no mass in kg."),
         (3.0, MISSING.format("three")),
         (np.sqrt(2), MISSING.format("the square root of two")),
     )
@@ -149,6 +151,7 @@ class Numbers:
             or self._related(answer, right)
             or self._two_mistakes(answer, i)
             or self._other_quantity(answer, i)
+            or self._taken(answer, i)
             or self._outside(answer)
         )
 
@@ -180,14 +183,12 @@ class Numbers:
 
     def _related(self, answer: float, right: float) -> Verdict | None:
         """Whether an answer is a factor or a function away from the right one."""
-        for kind, factor, told in LOST:
-            if self.agrees_alone(factor * answer, right):
-                return wrong(kind, told)
         with np.errstate(all="ignore"):
-            for function, told in RELATED:
-                if self.agrees_alone(answer, float(function(np.float64(right)))):
-                    return wrong("related", told)
-        return None
+            ways = [(right / factor, kind, told) for kind, factor, told in LOST]
+            ways += [(float(f(np.float64(right))), "related", told) for f, told in RELATED]
+        near = [one for one in ways if self.agrees_alone(answer, one[0])]
+        best = min(near, key=lambda one: abs(one[0] - answer), default=None)
+        return wrong(*best[1:]) if best else None
 
     def _two_mistakes(self, answer: float, i: int) -> Verdict | None:
         """A mistake in the formula, and a sign, a factor of two or a unit besides; or two."""
@@ -198,6 +199,13 @@ class Numbers:
                     return wrong("formula", f"{told} {besides}")
         for number, told in two_mistakes(formula, given):
             if fits(abs(answer), abs(number)):
+                return wrong("formula", told)
+        return None
+
+    def _taken(self, answer: float, i: int) -> Verdict | None:
+        """Whether a quantity was taken in another unit, or its half or double."""
+        for number, told in taken(self._formula(i), tuple(self.given.items())):
+            if fits(answer, number) or self.agrees_alone(answer, number):
                 return wrong("formula", told)
         return None
 

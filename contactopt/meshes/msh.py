@@ -1,33 +1,24 @@
-"""Gmsh's file format 4.1.
+"""Gmsh's file formats 2 and 4.1.
 
-meshio does not read it where some elements belong to no group, as in files that Gmsh writes with
-the option Mesh.SaveAll. From damaged binary files it takes counts as they are and asks for memory
-without bound; here no count reaches beyond its section. A file holds sections
-`$Name ... $EndName`. Entities (points, curves, surfaces, volumes) list the physical groups that
-they belong to; nodes and elements come entity by entity.
+meshio does not read them where some elements belong to no group, as in files of format 4.1 that
+Gmsh writes with the option Mesh.SaveAll, or have no tags. From damaged binary files it takes counts
+as they are and asks for memory without bound; here no count reaches beyond its section. A file
+holds sections `$Name ... $EndName`. In format 4.1 entities (points, curves, surfaces, volumes) list
+the physical groups that they belong to, and nodes and elements come entity by entity. In format 2
+each element has tags, the first of which is its physical group. Results are passed over.
 
 Source: Gmsh reference manual, version 4.15, chapter "MSH file format".
 """
 
 from __future__ import annotations
 
-import re
-import shlex
-import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from contactopt.errors import Damaged
-
-# sections of results: $NodeData ... $EndNodeData
-VIEWS = re.compile(
-    rb"^\$(NodeData|ElementData|ElementNodeData|InterpolationScheme)\b.*?^\$End\1\s*",
-    re.DOTALL | re.MULTILINE,
-)
 
 
 def version(path: Path) -> tuple[str | None, bool]:
@@ -41,28 +32,6 @@ def version(path: Path) -> tuple[str | None, bool]:
     if len(head) > 2 and head[0] == "$MeshFormat":
         return head[1], head[2] != "0"
     return None, False
-
-
-def parametric(path: Path) -> bool:
-    """Whether a file of version 2 has parametric nodes."""
-    with path.open("rb") as file:
-        return any(line.startswith(b"$ParametricNodes") for line in file)
-
-
-@contextmanager
-def without_views(path: Path) -> Iterator[Path]:
-    """A copy of a file of version 2 without the results in it, or the file if it has none. meshio
-    refuses those that are known at some nodes only.
-    """
-    data = path.read_bytes()
-    kept = VIEWS.sub(b"", data)
-    if len(kept) == len(data):
-        yield path
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / path.name
-        copy.write_bytes(kept)
-        yield copy
 
 
 def read_msh4(path: Path) -> Any:
@@ -90,35 +59,46 @@ def read_msh4(path: Path) -> Any:
     return _mesh(points, tags, blocks, sets)
 
 
-def read_parametric(path: Path) -> Any:
-    """The mesh of a file of version 2 whose nodes have parameters on their entities, as the option
-    Mesh.SaveParametric writes them in text; meshio reads the others. Errors as above.
+def read_msh2(path: Path) -> Any:
+    """The mesh of a file of format 2 in the same way. In text its nodes may have parameters on
+    their entities, as the option Mesh.SaveParametric writes them.
     """
-    if version(path)[1]:
-        raise Damaged("it has parametric nodes in binary; save it without Mesh.SaveParametric")
     sections = _sections(path)
-    names, reader = _names(sections), sections["ParametricNodes"]
-    tags, points = [], []
-    for _ in range(reader.count()):
-        tag, x, y, z, dim, _ = reader.take(6, "f8").tolist()
-        tags.append(int(tag))
-        points.append((x, y, z))
-        reader.take(int(dim) % 3, "f8")  # none within a volume
-    blocks: dict[tuple[int, str], list[np.ndarray]] = {}
+    names = _names(sections)
+    if "Nodes" in sections:
+        tags, points = sections["Nodes"].nodes(sections["Nodes"].line())
+    else:
+        tags, points = _parametric(sections["ParametricNodes"])
+    found: dict[int, list[np.ndarray]] = {}  # the group of each element and its nodes, by kind
     reader = sections["Elements"]
-    for _ in range(reader.count()):
-        kind, count = reader.take(3).tolist()[1:]
-        group = int(reader.take(count)[0]) if count else 0
-        nodes = reader.take(_nodes_of(kind))
-        dim = _dimension_of(kind)
-        name = names.get((dim, group), str(group)) if group else ""
-        blocks.setdefault((kind, name), []).append(nodes)
-    rows = [(kind, np.array(nodes)) for (kind, _), nodes in blocks.items()]
-    sets = {
-        name: [np.arange(len(n) if own == name else 0) for (_, own), n in blocks.items()]
-        for name in dict.fromkeys(name for _, name in blocks if name)
-    }
-    return _mesh(np.array(points), np.array(tags), rows, sets)
+    count = reader.line()
+    for kind, own, rows in reader.elements(count):
+        group = rows[:, :1] if own else np.zeros((len(rows), 1), dtype=np.int64)
+        found.setdefault(kind, []).append(np.hstack([np.abs(group), rows[:, own:]]))
+        count -= len(rows)
+    if count:
+        raise Damaged("a section ends early")
+    table = {kind: np.concatenate(own) for kind, own in found.items()}
+    sets: dict[str, list[np.ndarray]] = {}
+    for i, (kind, rows) in enumerate(table.items()):
+        for tag in np.unique(rows[rows[:, 0] > 0, 0]).tolist():
+            name = names.get((_dimension_of(kind), tag), str(tag))
+            none = [np.arange(0) for _ in table]
+            sets.setdefault(name, none)[i] = np.flatnonzero(rows[:, 0] == tag)
+    return _mesh(points, tags, [(kind, rows[:, 1:]) for kind, rows in table.items()], sets)
+
+
+def _parametric(reader: _Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Tags (n,) and places (n, 3) of nodes with parameters."""
+    if isinstance(reader, _Bytes):
+        raise Damaged("it has parametric nodes in binary; save it without Mesh.SaveParametric")
+    rows = []
+    for _ in range(reader.line()):
+        rows.append(reader.take(4, "f8"))
+        dim = int(reader.take(2)[0])
+        reader.take(dim % 3, "f8")  # none within a volume
+    table = np.array(rows).reshape(-1, 4)
+    return table[:, 0].astype(np.int64), table[:, 1:]
 
 
 def _dimension_of(kind: int) -> int:
@@ -170,6 +150,30 @@ class _Numbers:
     def count(self) -> int:
         return int(self.take(1, "u8")[0])
 
+    def line(self) -> int:
+        """The number on a line of its own, which is text in binary files, too."""
+        return self.count()
+
+    def nodes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Tags (n,) and places (n, 3) of nodes of format 2."""
+        rows = self.take(4 * count, "f8").reshape(count, 4)
+        return rows[:, 0].astype(np.int64), rows[:, 1:]
+
+    def elements(self, count: int) -> Iterator[tuple[int, int, np.ndarray]]:
+        """Kind, number of tags, and the tags and nodes of elements of format 2 that are alike."""
+        flat, size = self.take(len(self.words) - self.place), 1
+        while count and len(flat) > 2:
+            kind, tags = flat[1:3].tolist()
+            width = 3 + tags + _nodes_of(kind)
+            rows = flat[: min(count, size, len(flat) // width) * width].reshape(-1, width)
+            alike = (rows[:, 1] == kind) & (rows[:, 2] == tags)
+            own = len(rows) if alike.all() else int(np.argmin(alike))
+            if not own:
+                return
+            yield kind, tags, rows[:own, 3:]
+            flat, count = flat[own * width :], count - own
+            size = 2 * size if own == size else 1  # most rows are like the one above
+
     def head(self) -> int:
         """The number of entities of a section; their total and range of tags are passed over."""
         return int(self.take(4, "u8")[0])
@@ -182,12 +186,32 @@ class _Bytes(_Numbers):
         self.data, self.order, self.place = data, order, 0
 
     def take(self, count: int, kind: str = "i4") -> np.ndarray:
-        dtype = np.dtype(self.order + kind)
+        values = self._of(np.dtype(self.order + kind), count)
+        return values.astype(float if kind == "f8" else np.int64)
+
+    def _of(self, dtype: np.dtype, count: int) -> np.ndarray:
         first, self.place = self.place, self.place + count * dtype.itemsize
         if count < 0 or self.place > len(self.data):
             raise Damaged("a section ends early")
-        values = np.frombuffer(self.data, dtype, count, first)
-        return values.astype(float if kind == "f8" else np.int64)
+        return np.frombuffer(self.data, dtype, count, first)
+
+    def line(self) -> int:
+        first, self.place = self.place, self.data.index(b"\n", self.place) + 1
+        return int(self.data[first : self.place])
+
+    def nodes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        dtype = np.dtype([("tag", f"{self.order}i4"), ("place", f"{self.order}f8", 3)])
+        rows = self._of(dtype, count)
+        return rows["tag"].astype(np.int64), rows["place"].astype(float)
+
+    def elements(self, count: int) -> Iterator[tuple[int, int, np.ndarray]]:
+        while count > 0:
+            kind, own, tags = self.take(3).tolist()
+            width = 1 + tags + _nodes_of(kind)
+            if min(own, tags + 1) < 1:
+                return
+            yield kind, tags, self.take(own * width).reshape(own, width)[:, 1:]
+            count -= own
 
 
 def _sections(path: Path) -> dict[str, _Numbers]:
@@ -217,8 +241,9 @@ def _names(sections: dict[str, _Numbers]) -> dict[tuple[int, int], str]:
     """(dimension, number) -> name of physical groups."""
     data = sections["PhysicalNames"].data if "PhysicalNames" in sections else b""
     lines = data.decode(errors="replace").splitlines()
-    rows = [shlex.split(line) for line in lines[1:] if line.strip()]
-    return {(int(dim), int(tag)): name for dim, tag, name in rows}
+    rows = [line.split(maxsplit=2) for line in lines[1:] if line.strip()]
+    ends = slice(1, -1)  # within quotation marks; others belong to the name
+    return {(int(dim), int(tag)): name.strip()[ends] for dim, tag, name in rows}
 
 
 def _groups(reader: _Numbers | None, names: dict) -> dict[tuple[int, int], list[str]]:
