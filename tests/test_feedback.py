@@ -162,6 +162,27 @@ def test_forces_that_belong_to_another_coefficient_order_or_quantity_are_told():
 def test_numbers_of_every_type_are_numbers_and_digits_that_are_cut_off_are_nearly_right(form):
     assert grade("2.6", form(1.625)).right
     assert "three digits" in grade("2.8", -0.430).sentence  # -0.43077
+    assert "three digits" in grade("5.10", 0.28).sentence  # 0.275
+
+
+@pytest.mark.parametrize(
+    ("number", "answer", "told"),
+    [
+        ("1.1", (3.86, 0.0), "wrong order"),
+        ("1.3", 4.3e-7, "the units"),  # of two digits
+        ("1.8", 1 / 2.2, "1 / (1 - x)"),
+        ("1.8", 10**-1.2, "base is 10"),
+        ("2.2", 5.3 / 6.2, "`Q_nt` is left out"),
+        ("3.7", 4.0, "the `d` of the text"),
+        ("4.1", (1640, 84), "Number 2: This comes out if `columns` is one too many"),
+        ("5.4", 0.2445, "A square is missing"),
+        ("6.5", 5.5 / (1 - 0.84), "taken for a factor"),
+        ("7.3", 2.1 - 0.84, "`K_nn * apart ** 2 / 2` is left out"),
+        ("7.3", 1.76, "`apart` is left out, or if the division by `2` is left out"),
+    ],
+)
+def test_the_mistake_itself_is_told(number, answer, told):
+    assert told in grade(number, answer).sentence
 
 
 def test_a_value_that_a_mistake_cannot_give_is_told_by_its_bounds_or_its_size():

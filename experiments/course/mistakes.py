@@ -50,7 +50,7 @@ MOST_CHANGES, MOST_QUANTITIES = 60, 7
 ENOUGH_DIGITS = 4
 ANOTHER = "This is the value of `{}`, and another quantity is asked for."
 # changes that somebody makes less often than others, which explain an answer last, and never surely
-SELDOM = ("is squared", "another exponent", "under a square root", "takes the place")
+SELDOM = ("is squared", "another exponent", "under a square root", "takes the place", "exchanged")
 EXPONENTS = (0.5, 1 / 3, 2 / 3, 2.0, 3.0)
 # what may be done besides to the number that a mistake gives
 BESIDES: tuple[tuple[Callable[[float], float], str], ...] = (
@@ -245,10 +245,12 @@ def changed(node: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr,
                 other_name = ast.Name(OTHERS[name], ast.Load())
                 yield ast.Call(other_name, [argument], []), f"`{OTHERS[name]}` replaces `{name}`"
             if name == "exp":
-                yield (
-                    ast.BinOp(ast.Constant(10.0), ast.Pow(), argument),
-                    "the base is 10, and not `e`",
-                )
+                power = ast.BinOp(ast.Constant(10.0), ast.Pow(), argument)
+                yield power, "the base is 10, and not `e`"
+                one = ast.Constant(1.0)
+                yield ast.BinOp(one, ast.Add(), argument), "`exp(x)` is taken for 1 + x"
+                inverse = ast.BinOp(one, ast.Div(), ast.BinOp(one, ast.Sub(), argument))
+                yield inverse, "`exp(x)` is taken for 1 / (1 - x)"
             if name in ("sin", "cos", "tan"):
                 turned = ast.BinOp(argument, ast.Mult(), ast.Constant(np.pi / 180))
                 yield ast.Call(node.func, [turned], []), "radians are taken for degrees"
@@ -292,7 +294,8 @@ def _changed_operation(
             yield left, f"the division by `{second}` is left out"
             yield ast.BinOp(left, ast.Mult(), right), WRONG_SIDE.format(second)
             if first != "1":
-                yield ast.BinOp(right, ast.Div(), left), f"`{first}` and `{second}` are exchanged"
+                upside_down = f"the fraction of `{first}` and `{second}` is upside down"
+                yield ast.BinOp(right, ast.Div(), left), upside_down
                 inverse = ast.BinOp(ast.Constant(1.0), ast.Div(), right)
                 yield inverse, f"the factor `{first}` is left out"
                 yield ast.BinOp(inverse, ast.Div(), left), WRONG_SIDE.format(first)
@@ -300,6 +303,10 @@ def _changed_operation(
             yield ast.BinOp(left, op, both), f"you divide by `{first} + {second}`"
         case ast.Pow():
             yield left, f"the exponent `{second}` of `{first}` is left out"
+            yield (
+                ast.BinOp(left, ast.Mult(), right),
+                f"the exponent of `{first}` is taken for a factor",
+            )
             for exponent in EXPONENTS:
                 other = ast.BinOp(left, ast.Pow(), ast.Constant(exponent))
                 yield other, f"`{first}` has another exponent than `{second}`"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import permutations
+from itertools import permutations, product
 from math import isclose
 from typing import Any
 
@@ -47,7 +47,7 @@ LOST = tuple(
     for f in (factor, 1 / factor)
 )
 # functions of the right answer that somebody gives in its place
-ANGLE = "This is the angle, and its tangent is asked for."
+ANGLE = "This is the angle whose tangent is the right answer."
 RELATED: tuple[tuple[Callable[[float], float], str], ...] = (
     (lambda x: 1 / x, "This is one over the right answer."),
     (lambda x: -1 / x, "This is one over the right answer, with the wrong sign."),
@@ -59,7 +59,10 @@ RELATED: tuple[tuple[Callable[[float], float], str], ...] = (
     (lambda x: x - 1, "This is the right answer minus one: a change, and not a ratio."),
     (lambda x: np.degrees(np.arctan(x)), ANGLE),
     (np.arctan, ANGLE),
-    (lambda x: np.sin(np.arctan(x)), "This is the sine of the angle whose tangent is asked for."),
+    (
+        lambda x: np.sin(np.arctan(x)),
+        "This is the sine of the angle whose tangent is the right answer.",
+    ),
     (np.log10, "This is the logarithm of the right answer."),
     (np.log, "This is the logarithm of the right answer."),
     (np.exp, "This is the exponential of the right answer."),
@@ -121,7 +124,8 @@ class Numbers:
             if " " in told and self.resembles(answer, other):
                 return wrong("mistake", told)
         if value.size == 1:
-            return self._one(float(answer.ravel()[0]), 0) or self._size(answer, value)
+            alone = float(answer.ravel()[0])
+            return self._one(alone, 0) or _besides(alone, listed) or self._size(answer, value)
         return self._several(answer, value)
 
     def _rounded(self, answer: np.ndarray, value: np.ndarray) -> bool:
@@ -142,16 +146,15 @@ class Numbers:
             return wrong("count", "A count is a whole number.")
         if self.counts and abs(answer - right) == 1:
             return wrong("count", "It is one too many or one too few. Look at the ends again.")
-        for kind, factor, told in SCALED:
-            if self.agrees_alone(factor * answer, right):
-                return wrong(kind, told)
         return (
-            self._from_formula(answer, i)
+            _scaled(answer, right, self.agrees_alone)
+            or self._from_formula(answer, i)
             or self._given(answer)
             or self._related(answer, right)
             or self._two_mistakes(answer, i)
             or self._other_quantity(answer, i)
             or self._taken(answer, i)
+            or (None if self.counts else _scaled(answer, right, _same_digits))
             or self._outside(answer)
         )
 
@@ -168,7 +171,7 @@ class Numbers:
         """One mistake: to all digits that are given, nearly, or rounded."""
         given = tuple(self.given.items())
         mistakes = wrong_values(self._formula(i), given, tuple(self.chapter.items()))
-        for same in (fits, self.agrees_alone, _same_digits):
+        for same in (fits, self.agrees_alone, *(() if self.counts else (_same_digits,))):
             for number, told in mistakes:
                 if same(answer, number):
                     return wrong("formula", told)
@@ -195,7 +198,7 @@ class Numbers:
         formula, given = self._formula(i), tuple(self.given.items())
         for change, besides in BESIDES:
             for number, told in wrong_values(formula, given, tuple(self.chapter.items())):
-                if number and fits(answer, change(number)):
+                if number and "of the text" not in told and fits(answer, change(number)):
                     return wrong("formula", f"{told} {besides}")
         for number, told in two_mistakes(formula, given):
             if fits(abs(answer), abs(number)):
@@ -277,6 +280,22 @@ def by_hand(
     numbers: Any = [int(x) for x in found] if formulas[0].startswith("ceil") else found
     whole = numbers[0] if len(numbers) == 1 else tuple(numbers)
     return Numbers(whole, close, tuple(formulas), given, least, most, chapter or {})
+
+
+def _scaled(answer: float, right: float, same: Callable[[float, float], bool]) -> Verdict | None:
+    """Whether an answer has the wrong sign, another unit or a factor of two."""
+    for kind, factor, told in SCALED:
+        if same(factor * answer, right):
+            return wrong(kind, told)
+    return None
+
+
+def _besides(answer: float, listed: Sequence[tuple[Any, str]]) -> Verdict | None:
+    """Whether an answer is a wrong answer of this exercise with another mistake besides."""
+    for (other, told), (change, besides) in product(listed, BESIDES):
+        if " " in told and other and fits(answer, change(float(other))):
+            return wrong("mistake", f"{told} {besides}")
+    return None
 
 
 def _same_digits(answer: float, value: float, close: float = CLOSE) -> bool:
