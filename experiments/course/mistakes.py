@@ -173,7 +173,9 @@ def _everywhere(tree: ast.expr) -> Iterator[tuple[ast.expr, str]]:
 
 def _once_more(tree: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr, str]]:
     """The right answer times a quantity, or over it."""
-    for name in given if len(given) <= MOST_QUANTITIES else ():
+    for name, number in given.items() if len(given) <= MOST_QUANTITIES else ():
+        if abs(number) in (0.5, 1.0, 2.0):
+            continue  # a factor of two is told as such
         for op, done in ((ast.Mult(), "multiplied"), (ast.Div(), "divided")):
             node = tree
             for times in ("once", "twice"):
@@ -210,6 +212,8 @@ def taken(formula: str, given: Given) -> Found:
     """Numbers that come out if one quantity is taken too large or too small."""
     known, found = dict(given), []
     for (factor, told), (name, number) in product(TAKEN, given):
+        if formula.startswith("ceil") and number == round(number):
+            continue  # a count has no unit
         wrong = value(formula, known | {name: factor * number})
         if np.isfinite(wrong):
             found.append((wrong, f"Perhaps `{name}` is taken {told}: then this comes out."))
@@ -338,6 +342,8 @@ def _sums(formula: str, given: Given) -> Found:
     known, tree = dict(given), ast.parse(formula, mode="eval").body
     parts, found = dict(known), []
     for (first, a), (second, b) in combinations(known.items(), 2):
+        if first.split("_")[0] != second.split("_")[0] or "_" not in first:
+            continue  # a mean is taken of quantities of one kind
         found += [((a + b) / 2, ANOTHER.format(f"({first} + {second}) / 2"))]
         if a * b > 0:
             found += [((a * b) ** 0.5, ANOTHER.format(f"sqrt({first} * {second})"))]
