@@ -20,22 +20,8 @@ import numpy as np
 
 from experiments.course.verdict import rounded
 
-NAMES = {
-    name: getattr(np, name)
-    for name in (
-        "sqrt",
-        "exp",
-        "log",
-        "log10",
-        "sin",
-        "cos",
-        "tan",
-        "arccos",
-        "ceil",
-        "floor",
-        "hypot",
-    )
-} | {"abs": abs, "pi": np.pi}
+FUNCTIONS = "sqrt exp log log10 sin cos tan arccos ceil floor hypot"
+NAMES = {name: getattr(np, name) for name in FUNCTIONS.split()} | {"abs": abs, "pi": np.pi}
 OTHERS = {
     "cos": "sin",
     "sin": "cos",
@@ -50,7 +36,15 @@ MOST_CHANGES, MOST_QUANTITIES = 60, 7
 ENOUGH_DIGITS = 4
 ANOTHER = "This is the value of `{}`, and another quantity is asked for."
 # changes that somebody makes less often than others, which explain an answer last, and never surely
-SELDOM = ("is squared", "another exponent", "under a square root", "takes the place", "exchanged")
+SELDOM = (
+    "is added to",
+    "right angle",
+    "is squared",
+    "another exponent",
+    "under a square root",
+    "takes the place",
+    "exchanged",
+)
 EXPONENTS = (0.5, 1 / 3, 2 / 3, 2.0, 3.0)
 # what may be done besides to the number that a mistake gives
 BESIDES: tuple[tuple[Callable[[float], float], str], ...] = (
@@ -280,6 +274,9 @@ def _changed_operation(
             yield ast.BinOp(left, flipped, right), f"the sign of `{second}` is wrong"
             yield left, f"`{second}` is left out"
             yield right, f"`{first}` is left out"
+            if isinstance(op, ast.Add):
+                sides = f"`{first}` and `{second}` are taken for the sides of a right angle"
+                yield ast.Call(ast.Name("hypot", ast.Load()), [left, right], []), sides
             if isinstance(right, ast.BinOp) and isinstance(right.op, ast.Pow):
                 whole = ast.BinOp(ast.BinOp(left, op, right.left), right.op, right.right)
                 yield whole, f"the exponent of `{ast.unparse(right.left)}` stands outside a bracket"
@@ -288,7 +285,10 @@ def _changed_operation(
             yield right, f"the factor `{first}` is left out"
             yield ast.BinOp(left, ast.Div(), right), WRONG_SIDE.format(second)
             yield ast.BinOp(right, ast.Div(), left), WRONG_SIDE.format(first)
-            yield ast.BinOp(left, ast.Add(), right), f"`{first}` is added to `{second}`: multiply"
+            yield (
+                ast.BinOp(left, ast.Add(), right),
+                f"`{first}` is added to `{second}`, and not multiplied",
+            )
             match left, right:
                 case ast.BinOp(a, ast.Add() | ast.Sub(), b), ast.BinOp(c, ast.Add() | ast.Sub(), d):
                     terms = ast.BinOp(a, ast.Mult(), c), ast.BinOp(b, ast.Mult(), d)

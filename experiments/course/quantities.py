@@ -125,7 +125,7 @@ class Numbers:
                 return wrong("mistake", told)
         if value.size == 1:
             alone = float(answer.ravel()[0])
-            return self._one(alone, 0) or _besides(alone, listed) or self._size(answer, value)
+            return self._one(alone, 0, listed) or self._size(answer, value)
         return self._several(answer, value)
 
     def _rounded(self, answer: np.ndarray, value: np.ndarray) -> bool:
@@ -139,8 +139,8 @@ class Numbers:
             for a, b in pairs
         )
 
-    def _one(self, answer: float, i: int) -> Verdict | None:
-        """What is wrong with number i, if it is a typical mistake."""
+    def _one(self, answer: float, i: int, listed: Sequence[tuple[Any, str]] = ()) -> Verdict | None:
+        """What is wrong with number i, if it is a typical mistake; the likeliest come first."""
         right = float(np.ravel(self.value)[i])
         if self.counts and answer != round(answer):
             return wrong("count", "A count is a whole number.")
@@ -149,9 +149,11 @@ class Numbers:
         return (
             _scaled(answer, right, self.agrees_alone)
             or (None if self.counts else _scaled(answer, right, _same_digits, SCALED[:-2]))
-            or self._from_formula(answer, i)
+            or self._from_formula(answer, i, likely=True)
             or self._given(answer)
             or self._related(answer, right)
+            or _besides(answer, listed)
+            or self._from_formula(answer, i, likely=False)
             or self._two_mistakes(answer, i)
             or self._other_quantity(answer, i)
             or self._taken(answer, i)
@@ -168,13 +170,18 @@ class Numbers:
     def _formula(self, i: int) -> str:
         return self.formulas[i] if i < len(self.formulas) else repr(float(np.ravel(self.value)[i]))
 
-    def _from_formula(self, answer: float, i: int) -> Verdict | None:
-        """One mistake: to all digits that are given, nearly, or rounded."""
+    def _from_formula(self, answer: float, i: int, likely: bool) -> Verdict | None:
+        """One mistake, likely or not: to all digits that are given, nearly, or rounded."""
         given = tuple(self.given.items())
-        mistakes = wrong_values(self._formula(i), given, tuple(self.chapter.items()))
+        mistakes = [
+            one
+            for one in wrong_values(self._formula(i), given, tuple(self.chapter.items()))
+            if one[1].startswith("Perhaps") != likely
+        ]
         for same in (fits, self.agrees_alone, *(() if self.counts else (_same_digits,))):
             for number, told in mistakes:
-                if same(answer, number):
+                # two digits fit to the right answer times a quantity by chance
+                if same(answer, number) and (same is not _same_digits or "more by" not in told):
                     return wrong("formula", told)
         return None
 
