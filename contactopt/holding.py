@@ -89,7 +89,8 @@ Note = Callable[[str], None]
 class Limit:
     """At which factors on a load the bodies slide away, tip over or lift off.
 
-    factor    above which they do; infinite: they never do; not a number: no push could be solved
+    factor    above which the bodies slide; infinite: they never do; not a number: no push could be
+              solved
     interval  of the factors at which forces in the friction cones balance the loads. Its upper
               end is `factor`. Below its lower end the bodies slide, too, even if `factor` is
               infinite. None: the bodies rest at no factor

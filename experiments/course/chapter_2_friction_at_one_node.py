@@ -160,9 +160,9 @@ assert np.allclose(
 #
 # $$ (r - r')'(u - u') \;\le\; 0 . $$
 #
-# This is called *monotone*. Tresca's law is monotone. In both states $r_t u_t = -g |u_t|$, and a
-# force within the bound does no more work than that on any other slip: $-r_t u_t' \le g |u_t'|$ and
-# $-r_t' u_t \le g |u_t|$. Multiply out, and everything cancels:
+# This is called *monotone*. Tresca's law is monotone. In both states $r_t u_t = -g |u_t|$, and on
+# another slip a force within the bound dissipates at most $g$ times that slip: $-r_t u_t' \le g
+# |u_t'|$ and $-r_t' u_t \le g |u_t|$. Multiply out, and everything cancels:
 #
 # $$ (r_t - r_t')(u_t - u_t') \;\le\; -g|u_t| - g|u_t'| + g|u_t'| + g|u_t| \;=\; 0 . $$
 #
