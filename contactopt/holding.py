@@ -89,10 +89,11 @@ Note = Callable[[str], None]
 class Limit:
     """At which factors on a load the bodies slide away, tip over or lift off.
 
-    factor    above which they do; infinite: above none; not a number: no push could be solved
-    interval  of the factors at which forces in the friction cones balance the loads, with `factor`
-              for its upper end: below its lower end, too, they do, though the factor be infinite.
-              None: the bodies rest at no factor
+    factor    above which the bodies slide; infinite: they never do; not a number: no push could be
+              solved
+    interval  of the factors at which forces in the friction cones balance the loads. Its upper
+              end is `factor`. Below its lower end the bodies slide, too, even if `factor` is
+              infinite. None: the bodies rest at no factor
     error     of the factor, estimated from two meshes, as an absolute number
     way       'statics', 'bound', 'push' or 'supports', which the sentence explains
     sentence  the answer in words

@@ -20,22 +20,8 @@ import numpy as np
 
 from experiments.course.verdict import rounded
 
-NAMES = {
-    name: getattr(np, name)
-    for name in (
-        "sqrt",
-        "exp",
-        "log",
-        "log10",
-        "sin",
-        "cos",
-        "tan",
-        "arccos",
-        "ceil",
-        "floor",
-        "hypot",
-    )
-} | {"abs": abs, "pi": np.pi}
+FUNCTIONS = "sqrt exp log log10 sin cos tan arccos ceil floor hypot"
+NAMES = {name: getattr(np, name) for name in FUNCTIONS.split()} | {"abs": abs, "pi": np.pi}
 OTHERS = {
     "cos": "sin",
     "sin": "cos",
@@ -50,7 +36,15 @@ MOST_CHANGES, MOST_QUANTITIES = 60, 7
 ENOUGH_DIGITS = 4
 ANOTHER = "This is the value of `{}`, and another quantity is asked for."
 # changes that somebody makes less often than others, which explain an answer last, and never surely
-SELDOM = ("is squared", "another exponent", "under a square root", "takes the place", "exchanged")
+SELDOM = (
+    "is added to",
+    "right angle",
+    "is squared",
+    "another exponent",
+    "under a square root",
+    "takes the place",
+    "exchanged",
+)
 EXPONENTS = (0.5, 1 / 3, 2 / 3, 2.0, 3.0)
 # what may be done besides to the number that a mistake gives
 BESIDES: tuple[tuple[Callable[[float], float], str], ...] = (
@@ -173,7 +167,9 @@ def _everywhere(tree: ast.expr) -> Iterator[tuple[ast.expr, str]]:
 
 def _once_more(tree: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr, str]]:
     """The right answer times a quantity, or over it."""
-    for name in given if len(given) <= MOST_QUANTITIES else ():
+    for name, number in given.items() if len(given) <= MOST_QUANTITIES else ():
+        if abs(number) in (0.5, 1.0, 2.0):
+            continue  # a factor of two is told as such
         for op, done in ((ast.Mult(), "multiplied"), (ast.Div(), "divided")):
             node = tree
             for times in ("once", "twice"):
@@ -210,6 +206,8 @@ def taken(formula: str, given: Given) -> Found:
     """Numbers that come out if one quantity is taken too large or too small."""
     known, found = dict(given), []
     for (factor, told), (name, number) in product(TAKEN, given):
+        if formula.startswith("ceil") and number == round(number):
+            continue  # a count has no unit
         wrong = value(formula, known | {name: factor * number})
         if np.isfinite(wrong):
             found.append((wrong, f"Perhaps `{name}` is taken {told}: then this comes out."))
@@ -276,6 +274,9 @@ def _changed_operation(
             yield ast.BinOp(left, flipped, right), f"the sign of `{second}` is wrong"
             yield left, f"`{second}` is left out"
             yield right, f"`{first}` is left out"
+            if isinstance(op, ast.Add):
+                sides = f"`{first}` and `{second}` are taken for the sides of a right angle"
+                yield ast.Call(ast.Name("hypot", ast.Load()), [left, right], []), sides
             if isinstance(right, ast.BinOp) and isinstance(right.op, ast.Pow):
                 whole = ast.BinOp(ast.BinOp(left, op, right.left), right.op, right.right)
                 yield whole, f"the exponent of `{ast.unparse(right.left)}` stands outside a bracket"
@@ -284,7 +285,10 @@ def _changed_operation(
             yield right, f"the factor `{first}` is left out"
             yield ast.BinOp(left, ast.Div(), right), WRONG_SIDE.format(second)
             yield ast.BinOp(right, ast.Div(), left), WRONG_SIDE.format(first)
-            yield ast.BinOp(left, ast.Add(), right), f"`{first}` is added to `{second}`: multiply"
+            yield (
+                ast.BinOp(left, ast.Add(), right),
+                f"`{first}` is added to `{second}`, and not multiplied",
+            )
             match left, right:
                 case ast.BinOp(a, ast.Add() | ast.Sub(), b), ast.BinOp(c, ast.Add() | ast.Sub(), d):
                     terms = ast.BinOp(a, ast.Mult(), c), ast.BinOp(b, ast.Mult(), d)
@@ -338,6 +342,8 @@ def _sums(formula: str, given: Given) -> Found:
     known, tree = dict(given), ast.parse(formula, mode="eval").body
     parts, found = dict(known), []
     for (first, a), (second, b) in combinations(known.items(), 2):
+        if first.split("_")[0] != second.split("_")[0] or "_" not in first:
+            continue  # a mean is taken of quantities of one kind
         found += [((a + b) / 2, ANOTHER.format(f"({first} + {second}) / 2"))]
         if a * b > 0:
             found += [((a * b) ** 0.5, ANOTHER.format(f"sqrt({first} * {second})"))]

@@ -108,8 +108,8 @@ class Numbers:
     def resembles(self, answer: Any, value: Any) -> bool:
         """Whether an answer is this wrong value, perhaps rounded to two digits."""
         a, b = np.asarray(answer, dtype=float), np.asarray(value, dtype=float)
-        if a.shape != b.shape:
-            return False
+        if a.shape != b.shape or self.counts:
+            return np.array_equal(a, b)
         pairs = zip(a.ravel(), b.ravel(), strict=True)
         return self.agrees(a, b) or all(_same_digits(x, y, self.close) for x, y in pairs)
 
@@ -125,7 +125,7 @@ class Numbers:
                 return wrong("mistake", told)
         if value.size == 1:
             alone = float(answer.ravel()[0])
-            return self._one(alone, 0) or _besides(alone, listed) or self._size(answer, value)
+            return self._one(alone, 0, listed) or self._size(answer, value)
         return self._several(answer, value)
 
     def _rounded(self, answer: np.ndarray, value: np.ndarray) -> bool:
@@ -139,8 +139,8 @@ class Numbers:
             for a, b in pairs
         )
 
-    def _one(self, answer: float, i: int) -> Verdict | None:
-        """What is wrong with number i, if it is a typical mistake."""
+    def _one(self, answer: float, i: int, listed: Sequence[tuple[Any, str]] = ()) -> Verdict | None:
+        """What is wrong with number i, if it is a typical mistake; the likeliest come first."""
         right = float(np.ravel(self.value)[i])
         if self.counts and answer != round(answer):
             return wrong("count", "A count is a whole number.")
@@ -148,13 +148,16 @@ class Numbers:
             return wrong("count", "It is one too many or one too few. Look at the ends again.")
         return (
             _scaled(answer, right, self.agrees_alone)
-            or self._from_formula(answer, i)
+            or (None if self.counts else _scaled(answer, right, _same_digits, SCALED[:-2]))
+            or self._from_formula(answer, i, likely=True)
             or self._given(answer)
             or self._related(answer, right)
+            or self._from_formula(answer, i, likely=False)
+            or _besides(answer, listed)
             or self._two_mistakes(answer, i)
             or self._other_quantity(answer, i)
             or self._taken(answer, i)
-            or (None if self.counts else _scaled(answer, right, _same_digits))
+            or (None if self.counts else _scaled(answer, right, _same_digits, SCALED[-2:]))
             or self._outside(answer)
         )
 
@@ -167,13 +170,18 @@ class Numbers:
     def _formula(self, i: int) -> str:
         return self.formulas[i] if i < len(self.formulas) else repr(float(np.ravel(self.value)[i]))
 
-    def _from_formula(self, answer: float, i: int) -> Verdict | None:
-        """One mistake: to all digits that are given, nearly, or rounded."""
+    def _from_formula(self, answer: float, i: int, likely: bool) -> Verdict | None:
+        """One mistake, likely or not: to all digits that are given, nearly, or rounded."""
         given = tuple(self.given.items())
-        mistakes = wrong_values(self._formula(i), given, tuple(self.chapter.items()))
+        mistakes = [
+            one
+            for one in wrong_values(self._formula(i), given, tuple(self.chapter.items()))
+            if one[1].startswith("Perhaps") != likely
+        ]
         for same in (fits, self.agrees_alone, *(() if self.counts else (_same_digits,))):
             for number, told in mistakes:
-                if same(answer, number):
+                # two digits fit to the square of a quantity by chance
+                if same(answer, number) and (same is not _same_digits or "twice more" not in told):
                     return wrong("formula", told)
         return None
 
@@ -187,7 +195,7 @@ class Numbers:
     def _related(self, answer: float, right: float) -> Verdict | None:
         """Whether an answer is a factor or a function away from the right one."""
         with np.errstate(all="ignore"):
-            ways = [(right / factor, kind, told) for kind, factor, told in LOST]
+            ways = [(right / factor, kind, told) for kind, factor, told in LOST if not self.counts]
             ways += [(float(f(np.float64(right))), "related", told) for f, told in RELATED]
         near = [one for one in ways if self.agrees_alone(answer, one[0])]
         best = min(near, key=lambda one: abs(one[0] - answer), default=None)
@@ -198,7 +206,8 @@ class Numbers:
         formula, given = self._formula(i), tuple(self.given.items())
         for change, besides in BESIDES:
             for number, told in wrong_values(formula, given, tuple(self.chapter.items())):
-                if number and "of the text" not in told and fits(answer, change(number)):
+                alone = "of the text" in told or "right answer" in told
+                if number and not alone and fits(answer, change(number)):
                     return wrong("formula", f"{told} {besides}")
         for number, told in two_mistakes(formula, given):
             if fits(abs(answer), abs(number)):
@@ -282,12 +291,15 @@ def by_hand(
     return Numbers(whole, close, tuple(formulas), given, least, most, chapter or {})
 
 
-def _scaled(answer: float, right: float, same: Callable[[float, float], bool]) -> Verdict | None:
+def _scaled(
+    answer: float,
+    right: float,
+    same: Callable[[float, float], bool],
+    ways: Sequence[tuple[str, float, str]] = SCALED,
+) -> Verdict | None:
     """Whether an answer has the wrong sign, another unit or a factor of two."""
-    for kind, factor, told in SCALED:
-        if same(factor * answer, right):
-            return wrong(kind, told)
-    return None
+    found = (wrong(kind, told) for kind, factor, told in ways if same(answer, right / factor))
+    return next(found, None)
 
 
 def _besides(answer: float, listed: Sequence[tuple[Any, str]]) -> Verdict | None:
