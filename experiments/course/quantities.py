@@ -152,8 +152,8 @@ class Numbers:
             or self._from_formula(answer, i, likely=True)
             or self._given(answer)
             or self._related(answer, right)
-            or _besides(answer, listed)
             or self._from_formula(answer, i, likely=False)
+            or _besides(answer, listed)
             or self._two_mistakes(answer, i)
             or self._other_quantity(answer, i)
             or self._taken(answer, i)
@@ -180,8 +180,8 @@ class Numbers:
         ]
         for same in (fits, self.agrees_alone, *(() if self.counts else (_same_digits,))):
             for number, told in mistakes:
-                # two digits fit to the right answer times a quantity by chance
-                if same(answer, number) and (same is not _same_digits or "more by" not in told):
+                # two digits fit to the square of a quantity by chance
+                if same(answer, number) and (same is not _same_digits or "twice more" not in told):
                     return wrong("formula", told)
         return None
 
