@@ -390,14 +390,14 @@ the others are in units of N and mm:
 **Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. It
 compares the gradient of one function with respect to all data (q, mu, s, Q, V) with the whole
 solve. The gradient takes the certificate of the solution and one solve with the transposed
-system. The dense rows take the Cholesky factor that Newton's method has made. It is kept for the
-problem that was factorised last, as long as that problem is in use. The column "anew" is the
-gradient of a copy of the problem, for which no factor is kept. With multigrid the certificate
+system. The dense rows use the Cholesky factor that Newton's method has made. This factor is kept
+for the problem that was factorised last, as long as that problem is in use. The column "anew" is
+the gradient of a copy of the problem, for which no factor is kept. With multigrid the certificate
 takes one V-cycle, since the solution has the displacements of the bodies. The coupled linear
-system is solved to the certificate of the solution, at most to 1e-11, because its matrix is not
-known better. Every V-cycle about halves what is left. So ten digits of a gradient take about as
-many V-cycles as all steps of Newton's method, which are inexact, and this row stays near the
-whole solve.
+system is solved to the certificate of the solution, at most to 1e-11, because the matrix itself
+is not known more exactly. Every V-cycle about halves the error. So ten digits of a gradient take
+about as many V-cycles as all steps of Newton's method, which are inexact, and this row stays near
+the whole solve.
 
 {{costs}}
 
