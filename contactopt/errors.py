@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 class InputError(ValueError):
-    """Something the user gave cannot be used; the message says what and what to do."""
+    """An input cannot be used; the message says what is wrong, and what to do."""
 
 
 class Unbalanced(InputError):

@@ -19,6 +19,8 @@ load adds g to the displacements at r = 0 [length] and l to the resultants [forc
    and Q* is semidefinite because [Q g; g' c] is. After the states of the load path, d grows from
    0 by the factor GROWTH from push to push, slip measured from the push before, until f no longer
    does, by far less than with the steepest push.
+   What contacts make of it that close after a motion beyond SMALL is not counted: displacements
+   are taken for small, and an open corner may close in them by a turn of 2 rad.
    It grows for ever where all forces grow with d: the cones and the laws are homogeneous, so that
    nothing but what stays, however small beside it, could end that.
 3. Trial. Forces of a body that locks itself balance any load, but need not arise. Where statics has
@@ -63,6 +65,7 @@ if TYPE_CHECKING:
 
 GROWTH = 4.0  # of the prescribed motion from push to push
 EARLY = 6  # pushes that need not be solved while the motion is small
+SMALL = 0.1  # motion over the extent of the contacts, beyond which it is not small
 PUSHES = 20  # so that the last one is 1e12 times the first
 STEADY = 1e-5  # relative growth of the force below which it no longer grows
 ALIKE = 1e-3  # relative difference by which forces are a multiple of others, or two limits the same
@@ -75,6 +78,10 @@ WAYS = {
     "push": "found by pushing the place of the load until its force no longer grew",
     "supports": "supports bear this load, whatever friction does",
 }
+FAR = (
+    " Contacts that are open now would hold more, but only after a motion that is not small, of"
+    " which displacements that are taken for small say nothing."
+)
 Note = Callable[[str], None]
 
 
@@ -82,10 +89,11 @@ Note = Callable[[str], None]
 class Limit:
     """At which factors on a load the bodies slide away, tip over or lift off.
 
-    factor    above which they do; infinite: above none; not a number: no push could be solved
-    interval  of the factors at which forces in the friction cones balance the loads, with `factor`
-              for its upper end: below its lower end, too, they do, though the factor be infinite.
-              None: the bodies rest at no factor
+    factor    above which the bodies slide; infinite: they never do; not a number: no push could be
+              solved
+    interval  of the factors at which forces in the friction cones balance the loads. Its upper
+              end is `factor`. Below its lower end the bodies slide, too, even if `factor` is
+              infinite. None: the bodies rest at no factor
     error     of the factor, estimated from two meshes, as an absolute number
     way       'statics', 'bound', 'push' or 'supports', which the sentence explains
     sentence  the answer in words
@@ -234,6 +242,7 @@ class Found(NamedTuple):
 
     tried   whether the lower end was found by trial
     closes  whether contacts that are open when the bodies slide away may stop them
+    far     whether they would hold more after a motion that is not small
     """
 
     factor: float
@@ -241,6 +250,7 @@ class Found(NamedTuple):
     way: str
     tried: bool = False
     closes: bool = False
+    far: bool = False
 
 
 def _on_mesh(held: tuple[Scene, ...], last: Scene, note: Note) -> Found:
@@ -263,7 +273,7 @@ def _on_mesh(held: tuple[Scene, ...], last: Scene, note: Note) -> Found:
     if np.isnan(high):
         return Found(0.0, None, "statics")
     note(f"statics: {low:.6g} to {high:.6g}")
-    found = push.force(slipped, note)
+    found, far = push.force(slipped, note)
     tried = False
     if low <= 0 < high and not rests:
         least = push.least(min(1.0, found, high), note)
@@ -273,7 +283,7 @@ def _on_mesh(held: tuple[Scene, ...], last: Scene, note: Note) -> Found:
     if found == high or abs(found - high) <= ALIKE * min(abs(high), abs(found)) + push.nothing:
         return Found(high, (low, high), "statics", tried)
     closes = found < high and bool(push.problem.gaps.max() > 0)
-    return Found(found, (low, found), "push", tried, closes)
+    return Found(found, (low, found), "push", tried, closes, far)
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,8 +351,10 @@ class _Push:
             note(f"trial: {low:.6g} to {high:.6g}")
         return high if low > 0 else -np.inf
 
-    def force(self, slipped: np.ndarray | float, note: Note) -> float:
-        """The largest f: infinite if it grows for ever, not a number if a push is not solved."""
+    def force(self, slipped: np.ndarray | float, note: Note) -> tuple[float, bool]:
+        """The largest f while motions are small, infinite if it grows for ever, not a number if a
+        push is not solved; and whether it grows again when they are not.
+        """
         old, size = self.problem, float(np.linalg.norm(self.load))
         turn = la.qr(self.load[:, None])[0]
         turn[:, 0] = self.load / size
@@ -353,7 +365,8 @@ class _Push:
         pushed = old.altered(V=V[:, 1:], s=s[1:], Q=Q, q=q, motions=())
         loaded = old.altered(s=np.abs(old.s) + np.abs(self.load))
         first = size * max(scales_of(own).length for own in (old, loaded))
-        d, f, r, start, steepest = 0.0, np.nan, np.zeros(q.shape), None, 0.0
+        d, f, r, start, steepest, still = 0.0, np.nan, np.zeros(q.shape), None, 0.0, np.nan
+        bound, at_first = SMALL * np.ptp(old.coordinates, axis=1).max(), None
         for push in range(PUSHES):
             q_d = q + d * v.reshape(q.shape)
             step = q_d.copy()
@@ -364,24 +377,29 @@ class _Push:
                 if start is None and push < EARLY:  # where nothing rests without the load
                     d = GROWTH * d or first
                     continue
-                return np.nan
+                return np.nan, False
             before, f, last, r = f, -float(v @ now.reactions.ravel()) - rest, r, now.reactions
             note(f"push {push + 1}: {f:.6g} times the load")
             slope = abs(f - before) / ((1 - 1 / GROWTH * (push > 1)) * d or np.inf)
             steepest = np.fmax(steepest, slope)
             small = STEADY * abs(f) + self.nothing
             if abs(f - before) <= small and (slope <= ALIKE * steepest or abs(f) <= small):
-                return max(f, before)
+                return max(f, before), False
+            if f - still > ALIKE * abs(f) + self.nothing:
+                return still, True
             if push > 1 and np.linalg.norm(r - GROWTH * last) <= ALIKE * np.linalg.norm(r):
                 break
             u = pushed.altered(q=q_d).displacements(r, now.multipliers)
+            at_first = u if at_first is None else at_first
+            far = np.linalg.norm(u - at_first, axis=1).max() > bound
+            still = f if far and abs(f - before) <= small else np.nan
             slipped, start, d = u[:, 1:], now, GROWTH * d or first
-        return np.inf
+        return np.inf, False
 
 
 def _words(scene: Scene, load: str, force: float | None, found: list[Found]) -> str:
     """The answer in a few sentences: both ends, whether 1 lies between them, whence they come."""
-    factor, interval, way, tried, closes = found[-1]
+    factor, interval, way, tried, closes, far = found[-1]
     if interval is None:
         return f"{scene.name}: the bodies {AWAY}, whatever the factor on {load} is."
     low, high = interval
@@ -413,7 +431,7 @@ def _words(scene: Scene, load: str, force: float | None, found: list[Found]) -> 
     source = "; ".join(sources).capitalize()
     return (
         f"{scene.name}: the bodies {AWAY} {ends}. At 1, the load as given, {given}. {source};"
-        f" {_apart(found)}."
+        f" {_apart(found)}.{FAR if far else ''}"
     )
 
 

@@ -26,6 +26,7 @@ from contactopt.bodies.corners import copies
 from contactopt.bodies.elements import make_basis
 from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve
+from contactopt.methods import exchanged
 
 E, NU = 1e4, 0.3
 STRESS = {2: np.array([-0.6, -1.0]), 3: np.array([-0.6, -0.3, -1.0])}
@@ -117,6 +118,39 @@ def test_a_corner_under_constant_pressure_has_no_friction(degree, kind, law, mu)
     result = run(replace(scene, bodies=tuple(bodies)), figures=())
     assert np.abs(result.pressure - 1).max() < 1e-6
     assert np.abs(result.solution.reactions[:, 1]).max() < 1e-6
+
+
+def cubic(cells: int, degree: int, shear: float = 0.0) -> Scene:
+    """A cube in a rough seat, pressed by 1 on all sides, and pushed along one edge."""
+    scene = seated((cells, cells), ("quad", "quad"), 3, degree, (Contact("block", "seat", 0.3),))
+    loads = [tuple(Traction(f"high{i}", tuple(-np.eye(3)[i])) for i in range(3))] * 2
+    push = Traction("high2", (0.0, shear, -1.0))
+    loads[1] = (*loads[1][:2], push)
+    bodies = (replace(part, loads=own) for part, own in zip(scene.bodies, loads))
+    return replace(scene, bodies=tuple(bodies))
+
+
+@pytest.mark.slow
+def test_edges_in_space_under_constant_pressure_have_no_friction():
+    solution = solve(reduce(cubic(4, 2)))  # 243 contacts exchange forces along three edges
+    assert np.abs(solution.reactions[:, 1:]).max() < 1e-6 * solution.reactions[:, 0].max()
+
+
+@pytest.mark.parametrize(
+    ("bound", "said"),
+    [
+        (600, "and at 5 more places, where several surfaces meet, the contact forces are not"),
+        (10, "and at 6 more places, where several surfaces meet, friction acts; whether its"),
+    ],
+)
+def test_what_edges_exchange_or_what_is_not_looked_at_is_said_once(monkeypatch, bound, said):
+    monkeypatch.setattr(exchanged, "FEW", bound)
+    monkeypatch.setattr(exchanged, "NEAREST", 27 if bound > 10 else 1)
+    for shear in (0.0, 0.2)[bound < 600 :]:
+        notes = [
+            note for note in solve(reduce(cubic(2, 1, shear))).notes if "surfaces meet" in note
+        ]
+        assert len(notes) == (shear > 0) and all(said in note for note in notes)
 
 
 def slanted(rise: float, cells: tuple[int, int], kind: str, degree: int, law: str) -> Scene:

@@ -56,16 +56,26 @@ CALQUES = (
     r"\bstands? at the head of\b",
     r"\bnumbered from \d+ on\b",
     r"\bis of the order of the elements\b",
+    r"\b(?:large|long|small) beside (?:its|the|their)\b",
+    r"\bsolvers? that others wrote\b",
+    r"\btold before it\b",
+    r"\bpass(?:es)? a constant pressure on\b",
+    r"\bthe way matters\b",
+    r"\bdivide the way\b",
+    r"\bby as much, in shares\b",
+    r"\b(?:bound|deck|FCLib) knows\b",
+    r"\botherwise than expected\b",
+    r"\bfrom the least on\b",
 )
-FOLDERS = ("contactopt", "experiments/site", "experiments/course", "experiments/tutorials")
+FOLDERS = ("contactopt", "experiments")
 KINDS = {".py", ".md", ".toml", ".js", ".html"}
 QUOTED = re.compile(r"^\| not \| but \|\n(?:\|.*\n)*", re.M)  # examples of CONTRIBUTING.md
 
 
 def texts():
-    for name in ("README.md", "CONTRIBUTING.md", "reports/README.md"):
+    for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "reports/README.md"):
         yield ROOT / name
-    for folder in (*FOLDERS, "experiments/gallery"):
+    for folder in FOLDERS:
         for path in (ROOT / folder).rglob("*"):
             if path.suffix in KINDS and "generated" not in path.parts:
                 yield path

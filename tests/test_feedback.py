@@ -118,7 +118,6 @@ def test_every_force_on_a_surface_knows_its_areas():
         (7.4 / (53 - 0.845), "Perhaps `a` is taken in another unit"),
         (7.4 / (10.6 - 0.845), "Perhaps `a` is taken twice as large"),
         (7.4 / 4.455 / 9.81, "no mass in kg"),
-        (np.sqrt(3.7 * 5.3), "the value of `sqrt(m * a)`"),
         (7.4 / (5.3 - 0.65), "the exponent `2` of `k` is left out"),
         (4.455, "This is `a - k ** 2 / 2`, a step on the way"),
         (7.4 / (5.3 - 0.5 * 1.9**2), "This has the `k` of the text"),
@@ -162,6 +161,35 @@ def test_forces_that_belong_to_another_coefficient_order_or_quantity_are_told():
 def test_numbers_of_every_type_are_numbers_and_digits_that_are_cut_off_are_nearly_right(form):
     assert grade("2.6", form(1.625)).right
     assert "three digits" in grade("2.8", -0.430).sentence  # -0.43077
+    assert "three digits" in grade("5.10", 0.28).sentence  # 0.275
+
+
+@pytest.mark.parametrize(
+    ("number", "answer", "told"),
+    [
+        ("1.1", (3.86, 0.0), "wrong order"),
+        ("1.2", -2.6, "the sign is not"),
+        ("1.3", 4.3e-7, "the units"),  # of two digits
+        ("1.8", 1 / 2.2, "1 / (1 - x)"),
+        ("1.8", 10**-1.2, "base is 10"),
+        ("2.2", 5.3 / 6.2, "`Q_nt` is left out"),
+        ("2.8", -0.28, "Perhaps `Q_tt` takes the place of `Q_nn`"),
+        ("3.6", 40 * 8 / 0.0003, "once more by `N`"),
+        ("3.7", 4.0, "the `d` of the text"),
+        ("4.1", (1640, 84), "Number 2: This comes out if `columns` is one too many"),
+        ("4.1", (1600, 82), "Of your 2 numbers these are right: [2]"),
+        ("4.5", 0.54, "factor of two"),
+        ("4.5", np.sqrt(5.1), "the value of `sqrt(k_1 * k_2)`"),
+        ("5.2", np.hypot(4.92, 9.45), "the sides of a right angle"),
+        ("5.2", 18.9, "The runner on ice holds something as well. Besides, it is twice as large"),
+        ("5.4", 0.2445, "A square is missing"),
+        ("6.5", 5.5 / (1 - 0.84), "taken for a factor"),
+        ("7.3", 2.1 - 0.84, "`K_nn * apart ** 2 / 2` is left out"),
+        ("7.3", 1.76, "`apart` is left out, or if the division by `2` is left out"),
+    ],
+)
+def test_the_mistake_itself_is_told(number, answer, told):
+    assert told in grade(number, answer).sentence
 
 
 def test_a_value_that_a_mistake_cannot_give_is_told_by_its_bounds_or_its_size():

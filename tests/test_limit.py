@@ -303,3 +303,29 @@ def test_loads_that_are_not_there_are_refused_and_the_command_says_the_answer(ca
     named = ["limit", "punch-2d", "--set", "elements=4", "-q", "--load", "punch:top:y"]
     code = cli.main(named)
     assert "punch" in capsys.readouterr().out and code in (0, 1)
+
+
+def test_an_open_corner_that_closes_after_a_turn_is_not_counted():
+    """A bar leans at 60 degrees, touched at one corner of each end; moments about its foot give the
+    factor at which it slides. The other corner at the wall would close after 1.7 rad.
+    """
+    length, width, lean, mu = 4.0, 0.2, math.pi / 3, 0.5
+    cosine, sine = math.cos(lean), math.sin(lean)
+    turned = np.array([[cosine, -sine], [sine, cosine]]) @ [
+        [0, length, length, 0],
+        [0, 0, width, width],
+    ]
+    names = {"left": "foot", "right": "head"}
+    mesh = quadrilateral(turned.T, names, (8, 1))
+    loads = (BodyForce((0, -1.0)), Traction("foot", (-1.0, 0.0)))
+    bar = Part("bar", mesh, STIFF, (), loads)
+    floor = Rigid("floor", normal=(0.0, 1.0), gap=lambda x: x[1])
+    wall = Rigid("wall", normal=(-1.0, 0.0), gap=lambda x: length * cosine - x[0])
+    pairs = (Contact("bar:foot", "floor", mu), Contact("bar:head", "wall", 0.0))
+    found = limit(Scene("ladder", bodies=(bar, floor, wall), contacts=pairs), "bar:foot:x")
+    weight, head = length * width, turned[:, 1]
+    middle, foot = turned.mean(axis=1), (turned[:, 0] + turned[:, 3]) / 2
+    # moments about the lower corner of the foot, with N = weight and H = mu N - f width at the wall
+    f = (mu * weight * head[1] - weight * middle[0]) / (width * (head[1] - foot[1]))
+    assert found.factor == pytest.approx(f, rel=1e-4)
+    assert "after a motion that is not small" in found.sentence

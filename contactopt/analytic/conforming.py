@@ -30,7 +30,7 @@ def pin_in_hole(
     ----------
     force_per_length : Q [force / length]
     radius : R of pin and hole [length]
-    clearance : c, the difference of their radii [length], small beside R
+    clearance : c, the difference of their radii [length], small against R
     modulus : E* of the pair [stress], from contact_modulus()
 
     Returns
@@ -89,7 +89,7 @@ def press_fit(
     Parameters
     ----------
     interference : d, radius of the shaft less that of the hub before they are joined [length],
-        small beside R
+        small against R
     bore, radius, outside : a of the shaft (0: solid), R of the interface, c of the hub [length]
     shaft, hub : the materials
 

@@ -138,7 +138,7 @@ class Peer:
         law = problem.law
         plain = law.unilateral and law.proportional and not law.dilatant
         if not plain or law.stretch(problem.dim) is not None:
-            raise InputError(f"{self.name} knows Coulomb's law only, not {type(law).__name__}.")
+            raise InputError(f"{self.name} takes Coulomb's law only, not {type(law).__name__}.")
         if problem.dim not in dims and 3 not in dims:
             raise InputError(f"this solver of {self.name} is one of the plane.")
         if not has_entries(problem.Q):

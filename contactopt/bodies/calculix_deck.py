@@ -98,7 +98,7 @@ def _check(scene: Scene) -> None:
     for pair in scene.pairs:
         if not find_law(pair.law).plain_coulomb() or callable(pair.mu) or np.ndim(pair.mu) > 0:
             raise InputError(
-                f"contact '{pair.name}': a deck of CalculiX knows Coulomb's law with one number mu."
+                f"contact '{pair.name}': a deck of CalculiX takes Coulomb's law with one number mu."
             )
 
 

@@ -270,7 +270,7 @@ def assemble_half_space(
     if scene.analysis.revolved or scene.analysis.stretches or scene.copies > 1:
         raise InputError(
             f"half-space '{part.name}': scene '{scene.name}' must be 'plane-strain' or 'solid' with"
-            " copies = 1, because the forces between its points know no symmetry."
+            " copies = 1, because the forces between its points have no symmetry."
         )
     sides = {
         side for pair in scene.pairs for side, name in zip(SIDES, pair.bodies) if name == part.name

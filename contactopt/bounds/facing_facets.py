@@ -72,7 +72,7 @@ class FacingFacets:
         law = find_law(pair.law)
         if not (law.convex or law.plain_coulomb()) or law.dilatant or not law.opens:
             raise InputError(
-                f"{name} has the law '{pair.law}'; a bound knows contact that may open, with"
+                f"{name} has the law '{pair.law}'; there are bounds for contact that may open, with"
                 " Coulomb's friction, with a given bound of friction, or without friction."
             )
         if np.ptp(coupling.frames, axis=0).max() > EQUAL:

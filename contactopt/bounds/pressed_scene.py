@@ -283,7 +283,7 @@ class PressedScene:
         for support in part.supports:
             if support.boundary not in mesh.boundaries:
                 raise InputError(
-                    f"body '{part.name}': a bound knows no support at a point or edge."
+                    f"body '{part.name}': there is no bound with a support at a point or edge."
                 )
         for boundary, names in holding:
             for name in components if names is None else names:

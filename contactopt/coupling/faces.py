@@ -178,11 +178,16 @@ def _along(axes: np.ndarray, number: int, vectors: np.ndarray) -> np.ndarray:
 
 
 def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
-    """Solutions (n, m) of m systems of one or two equations, with entries A[row][column] (m,)."""
+    """Solutions (n, m) of m systems of one or two equations, with entries A[row][column] (m,); far
+    away where there is none, because a face is seen from its edge.
+    """
     if len(b) == 1:
-        return np.stack([b[0] / A[0][0]])
-    (a00, a01), (a10, a11) = A
-    return np.stack([a11 * b[0] - a01 * b[1], a00 * b[1] - a10 * b[0]]) / (a00 * a11 - a01 * a10)
+        over, divisor = np.stack(b), A[0][0]
+    else:
+        (a00, a01), (a10, a11) = A
+        over = np.stack([a11 * b[0] - a01 * b[1], a00 * b[1] - a10 * b[0]])
+        divisor = a00 * a11 - a01 * a10
+    return np.divide(over, divisor, out=np.full_like(over, 9.0), where=divisor != 0)
 
 
 def evaluate(element: skfem.Element, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,4 +1,4 @@
-"""Whether a coupling passes a constant pressure on: the patch test of one pair of surfaces.
+"""Whether a coupling transmits a constant pressure: the patch test of one pair of surfaces.
 
 A pressure of one on all contacts is the forces r_i = A_i n_i. Through the maps of the coupling they
 become nodal forces T' r of each body. They are right where they are the consistent nodal forces of

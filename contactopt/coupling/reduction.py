@@ -267,9 +267,9 @@ def reduce_bodies(
 
     Parameters
     ----------
-    scene, elements, zone, Q, solver, coupling : As for reduce(), and so are the errors.
-    once : Whether one problem is solved by Newton's steps. If not, factors serve more than that,
-        and multigrid is taken only where it costs much less.
+    scene, elements, zone, Q, solver, coupling : As for reduce(), which raises the same errors.
+    once : Whether only one problem is solved, by Newton's method. If not, factors of the bodies are
+        used again, and multigrid is taken only where it costs much less.
 
     Returns
     -------

@@ -65,8 +65,8 @@ def gradient(
     state: int = -1,
     distance: float | None = None,
 ) -> Gradient:
-    """The gradient of a quantity of a solved scene, or of one state of a load path, by the
-    parameters of the scene.
+    """The gradient of a quantity of a solved scene, or of one state of a load path, with
+    respect to the parameters of the scene.
 
     One adjoint solve of the interface problem and one of each body serve all parameters; on a path,
     those of every state.

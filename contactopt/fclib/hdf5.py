@@ -100,7 +100,7 @@ def write(
     law = problem.law
     if not (law.unilateral and law.proportional) or law.dilatant:
         raise InputError(
-            "FCLib knows Coulomb's law only; this problem"
+            "FCLib expresses Coulomb's law only; this problem"
             f" has {type(law).__name__} and cannot be written."
         )
     if not has_entries(problem.Q):

@@ -73,7 +73,7 @@ def _rounded(value: float, way: Callable[[float], float]) -> float:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """See the head of this module; print it for a summary.
+    """What `diagnose` finds; print it for a summary. The module explains the terms.
 
     size, held      n of Q (n, n); how many of its rows are zero: supported components, not counted
                     in the rank

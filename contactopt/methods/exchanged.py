@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.linear.operators import form, has_entries
 from contactopt.methods.notes import note
@@ -24,8 +25,8 @@ from contactopt.problem.scaling import immovable
 # thousandth within three elements.
 NEAREST = 40
 # The places along an edge in space exchange forces with each other and over more contacts than
-# these. With so few contacts all are looked at at once, in a fraction of a second.
-FEW = 200
+# these. With so few contacts all are looked at at once, in about a second.
+FEW = 600
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
@@ -35,24 +36,38 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
     """The solution with the least friction at every place where contacts can exchange forces, its
     certificate at most `tol`, and a note of a place where this leaves some, or several solutions.
     """
-    if not solution.solved or not has_entries(problem.Q):
+    points, places = problem.coordinates.T, problem.shared_places
+    if not solution.solved or not places:
         return solution
-    points, found = problem.coordinates.T, problem.shared_places
-    if found and problem.contacts <= FEW:
+    known, left, corners = has_entries(problem.Q), [], np.concatenate(places)
+    if known and problem.contacts <= FEW:
         everything = np.arange(problem.contacts)
-        solution = _exchanged(problem, solution, tol, everything, everything)[0]
-    for at in found:
+        solution, some = _exchanged(problem, solution, tol, everything, corners)
+        left += [_most_friction(solution, corners)] * some
+    for at in places if known else ():
         far = np.linalg.norm(points - points[at[0]], axis=1)
         near = np.argsort(far, kind="stable")[:NEAREST]
-        solution, left = _exchanged(problem, solution, tol, near, at)
-        if left:
-            note(
-                logging.getLogger(__name__),
-                f"at ({place_words(points[at[0]])}), where several surfaces meet,"
-                " the contact forces are not unique: forces that the contacts there exchange"
-                " change nothing else",
-            )
+        solution, some = _exchanged(problem, solution, tol, near, at)
+        left += [at[0]] * some
+    said = "the contact forces are not unique: forces that the contacts there exchange change"
+    said += " nothing else"
+    # in the plane a corner exchanges forces with contacts nearby alone
+    unseen = not known or (problem.contacts > FEW and problem.dim == 3)
+    if not left and unseen and _rubs(solution.reactions[corners]):
+        left = [_most_friction(solution, corners), *(at[0] for at in places)]
+        why = f"with more than {FEW} contacts" if known else "where Q is known by products only"
+        said = f"friction acts; whether its forces there are unique is not looked at {why}"
+    if left:
+        more = len(np.unique(points[left], axis=0)) - 1
+        others = f" and at {count(more, 'more place')}" * (more > 0)
+        where = f"at ({place_words(points[left[0]])}){others}, where several surfaces meet,"
+        note(logging.getLogger(__name__), f"{where} {said}")
     return solution
+
+
+def _most_friction(solution: Solution, at: np.ndarray) -> int:
+    """Of some contacts the one with the largest friction."""
+    return int(at[np.argmax(np.linalg.norm(solution.reactions[at, 1:], axis=1))])
 
 
 def _exchanged(
@@ -88,7 +103,11 @@ def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarr
     rows = own if problem.symmetric else slice(None)  # y'Q y = 0 if and only if Q y = 0
     columns = Q[rows][:, own] if form(Q) == "array" else Q[rows][:, own].toarray()
     motions = problem.V[own] / np.where(problem.reach > 0, problem.reach, 1.0)
-    felt = np.vstack([columns / (np.abs(columns).max() or 1.0), motions.T])
+    scaled = columns / (np.abs(columns).max() or 1.0)
+    if problem.symmetric:  # semidefinite, and so quicker
+        sizes, directions = np.linalg.eigh(scaled + motions @ motions.T)
+        return own, directions[:, np.abs(sizes) <= UNFELT]
+    felt = np.vstack([scaled, motions.T])
     sizes, directions = np.linalg.svd(felt, full_matrices=len(felt) < len(own))[1:]
     small = np.pad(sizes, (0, len(own) - len(sizes))) <= UNFELT
     return own, directions[small].T

@@ -125,7 +125,7 @@ def _robust_start(coarsest: Level, point: Point) -> Point:
 
 
 def _solve_level(level: Level, point: Point, enough: float = constants.COARSE_ENOUGH) -> Evaluation:
-    """Newton's steps on a coarse grid, until the residual is small beside the forces."""
+    """Newton's steps on a coarse grid, until the residual is small against the forces."""
     steps = GridSteps(level, enough)
     at = begin = steps.evaluate(point)
     for at in islice(newton_iterates(steps, begin), constants.COARSE_STEPS):

@@ -269,8 +269,8 @@ def amplification(
 def siconos_residual(
     problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray | None = None
 ) -> float:
-    """The measure that Siconos and the FCLib collection compare methods by; for comparison, not for
-    a verdict.
+    """The measure by which Siconos and the FCLib collection compare methods; for comparison, not
+    for a verdict.
 
     With K the product of the friction cones it is
     |r - proj_K(r - (u + mu |u_t| n))| / max(|q|, |r|, |u|), where |.| is the norm of all components

@@ -54,7 +54,7 @@ class Solution:
                  its iterates; "checks": of input, scaling and proofs. Who adds a phase of their
                  own names it: recovery, the coarse meshes before this one, the phases of a
                  reduction
-    notes        sentences about what the solve did otherwise than expected: a fallback, a stage
+    notes        sentences about what was unexpected in the solve: a fallback, a stage
                  that failed
     proof        status `infeasible`: what proves that there is no solution
     displacements  of the bodies that are solved by iteration, from methods that work on them (the

@@ -23,7 +23,7 @@ APART = 0.05  # relative difference of two readings of the largest pressure that
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Sentences on couplings that do not pass a constant pressure on; for certified solutions also
+    """Sentences on couplings that do not transmit a constant pressure; for certified solutions also
     on ties whose forces jump, and on zones that end by themselves and are smaller than FEWEST
     elements.
     """

@@ -183,8 +183,8 @@ class Rigid:
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """An elastic half-space (half-plane in 2D) without a mesh: what a body is that is large beside
-    its contact.
+    """An elastic half-space (half-plane in 2D) without a mesh: a model of a body that is large
+    compared with its contact.
 
     The upper body fills the half z >= 0, the lower the half z <= 0 (in 2D: y). It has no support:
     it deforms under the contact forces alone, and as a whole it is held, displaced or pressed by a
@@ -201,9 +201,9 @@ class HalfSpace:
                   nor a displacement are held
     periodic      whether surface and forces repeat themselves beyond the points. Displacements are
                   then measured from their mean
-    depth         in 2D, where displacements grow without end: how far beneath each force the point
-                  lies from which the displacements that it makes are measured [length]; by default
-                  ten times the length of the points
+    depth         in 2D, where displacements grow without end: the displacements that a force makes
+                  are measured from the point at this depth beneath it [length]; by default ten
+                  times the length of the points
     """
 
     name: str

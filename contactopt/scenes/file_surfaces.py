@@ -88,9 +88,10 @@ def _measured(
 ) -> tuple[tuple[int, ...], np.ndarray]:
     """The heights in a file, and the number of points along each axis.
 
-    A text holds a map, one line for each y from the least on, or in the plane one height per line;
-    or it holds places, a line with x, y and height for each, between which heights are linear. An
-    array in a .npy file is indexed [x, y].
+    A text file contains a map or a list of points. A map has one line for each y, the smallest
+    first; in the plane it has one height per line. A list has a line with x, y and height for each
+    point, and heights between the points are interpolated linearly. An array in a .npy file is
+    indexed [x, y].
     """
     name, unit = table.take("file", str, needed=True), table.take("unit", str)
     level = table.take("level", bool, False)

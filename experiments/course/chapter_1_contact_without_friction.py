@@ -200,7 +200,7 @@ assert answer.solved and np.allclose(answer.reactions, [[3.0, 0.0]])
 #
 # ## Proximal Galerkin: never below the floor
 #
-# The youngest of the four methods writes the gap as $u = e^{\psi}$, with a *latent variable*
+# The newest of the four methods writes the gap as $u = e^{\psi}$, with a *latent variable*
 # $\psi$. A gap of this form is always positive. The method goes in steps. Each step minimises the
 # energy $E(u)$ together with a term that keeps $u$ near the last gap $u_{\text{last}}$:
 #

@@ -160,9 +160,9 @@ assert np.allclose(
 #
 # $$ (r - r')'(u - u') \;\le\; 0 . $$
 #
-# This is called *monotone*. Tresca's law is monotone. In both states $r_t u_t = -g |u_t|$, and a
-# force within the bound does no more work than that on any other slip: $-r_t u_t' \le g |u_t'|$ and
-# $-r_t' u_t \le g |u_t|$. Multiply out, and everything cancels:
+# This is called *monotone*. Tresca's law is monotone. In both states $r_t u_t = -g |u_t|$, and on
+# another slip a force within the bound dissipates at most $g$ times that slip: $-r_t u_t' \le g
+# |u_t'|$ and $-r_t' u_t \le g |u_t|$. Multiply out, and everything cancels:
 #
 # $$ (r_t - r_t')(u_t - u_t') \;\le\; -g|u_t| - g|u_t'| + g|u_t'| + g|u_t| \;=\; 0 . $$
 #
@@ -371,12 +371,12 @@ assert solve(InterfaceProblem(Q, [q], much)).solved  # another method has
 # $$ \frac{\mu\, (\mu Q_{tt} - Q_{nt})}{Q_{nn} - 2 \mu Q_{nt} + \mu^2 Q_{tt}} . $$
 #
 # This factor is below $+1$ exactly if $\mu Q_{nt} < Q_{nn}$. If the node slips to the left, $Q_{nt}$
-# changes its sign in both formulas. So both directions are safe from $+1$ exactly if $\mu |Q_{nt}| <
-# Q_{nn}$, and this is also the condition under which every load has a single solution. For our node
-# $Q_{nt} = -1$. If it slips to the right, the factor stays between 0 and 1 for every $\mu$: strong
-# friction alone does no harm. But if normal and tangential motion are strongly coupled, $Q_{nt}^2 >
-# \tfrac89 Q_{nn} Q_{tt}$, the factor falls below $-1$ for some coefficients. Then the iteration runs
-# in a cycle, although the solution is unique.
+# changes its sign in both formulas. So the factor is below $+1$ in both directions exactly if
+# $\mu |Q_{nt}| < Q_{nn}$. This is also the condition under which every load has a single
+# solution. For our node $Q_{nt} = -1$. If it slips to the right, the factor stays between 0 and 1
+# for every $\mu$: strong friction alone does no harm. But if normal and tangential motion are
+# strongly coupled, $Q_{nt}^2 > \tfrac89 Q_{nn} Q_{tt}$, the factor falls below $-1$ for some
+# coefficients. Then the iteration runs in a cycle, although the solution is unique.
 
 # %%
 coupled, pulled, friction = (

@@ -249,9 +249,9 @@ assert errors[0] > 5 * errors[1] > 25 * errors[2]
 
 # %% [markdown]
 # A chart like this one asks the right question: *how long does each method take to reach the same
-# certificate?* Every point is the best of three runs on the machine that drew the figure,
-# so that small differences of time say nothing. A fair comparison uses many problems, as
-# `contactopt bench` does.
+# certificate?* Every point is the best of three runs on the machine that drew the figure. Small
+# differences of time mean nothing. A fair comparison uses many problems, as `contactopt bench`
+# does.
 #
 # ## What more friction does
 #
@@ -296,8 +296,8 @@ Slider(
 # Friction opposes the *velocity* of the slip: $r_t = -\mu r_n\, v / |v|$ with $v = \dot u_t$, if $v
 # \ne 0$. So far we wrote $u_t$ in its place. This needs a reason.
 #
-# Let the loads change so slowly that inertia does not matter. (This is called *quasistatic*.) Divide
-# the way of the loads into steps. At the end of the last step the tangential displacement was
+# Let the loads change so slowly that inertia does not matter. (This is called *quasistatic*.)
+# Divide the load path into steps. At the end of the last step the tangential displacement was
 # $u_t^{\text{old}}$. In the new step we replace the velocity by a difference:
 #
 # $$ v \approx \frac{u_t - u_t^{\text{old}}}{\Delta t} . $$
@@ -313,9 +313,9 @@ Slider(
 # The gap $u_n$ is not a difference, because contact has no memory. In the first step nothing has
 # slipped yet, and $u_t$ is the slip. This is what all programs above assume.
 #
-# One step is as good as many if no contact changes the direction of its slip on the way, and none
-# that has slipped sticks again. Otherwise the way matters. Here a node is pressed with 2 N, and pulled
-# to the right, to the left and to the right again.
+# One step is as good as many if no contact changes the direction of its slip within it, and none
+# that has slipped sticks again. Otherwise the path matters. Here a node is pressed with 2 N, and
+# pulled to the right, to the left and to the right again.
 
 
 # %%
@@ -354,9 +354,9 @@ ax.set(xlabel="pull $q_t$ [mm]", ylabel="friction force $r_t$ [N]")
 _ = ax.set(ylim=(-1.35, 1.35))
 
 # %% [markdown]
-# The friction force at a load is not known from the load. It depends on the way, and each cycle costs
-# work: this is *hysteresis*. contactopt follows such paths with bodies, too
-# ([a load cycle](../tutorials/a_load_cycle.py)).
+# The load alone does not determine the friction force. The path matters, and each cycle costs
+# work: this is *hysteresis*. contactopt follows such paths with bodies, too ([a load
+# cycle](../tutorials/a_load_cycle.py)).
 #
 # ## What fails: no solution
 #

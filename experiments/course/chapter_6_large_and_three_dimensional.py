@@ -314,7 +314,7 @@ assert products["neumann"][-1] < 1.1 * products["neumann"][0]  # does not
 #
 # $$ 2 \Bigl(\frac{\pi}{2m}\Bigr)^2 \sum_{l = 1}^{2m - 1} \frac{\sin^2 (\pi j l / 2m)}{\sin^2 (\pi l / 2m)} = \frac{\pi^2}{2 m^2}\, j\, (2m - j), \qquad 0 \le j \le m . $$
 #
-# It is between one half and one times $\pi^2 j / m$: *equivalent* to the wave number.
+# It lies between $\pi^2 j / 2m$ and $\pi^2 j / m$: it is *equivalent* to the wave number.
 
 # %% tags=["hide-input"]
 m = 16
@@ -345,8 +345,8 @@ _ = right.set(xlabel="node", yticks=(-1, 0, 1), title="two of its eigenvectors")
 # $\theta = \pi j / m$ per node hardly feels distances much shorter than its length: these terms sum up
 # to at most $\theta^2 \sum 2^i$, a multiple of $\theta$. Longer distances give at most $\sum 2^{-i}$, a
 # multiple of $\theta$ as well. One distance fits the wave, and gives at least a multiple of $\theta$.
-# (With another $m$ than a power of two the last group has no place. Then rows do not sum up to
-# zero, and the matrix is no seminorm.)
+# (If $m$ is not a power of two, the last group does not fit. Then rows do not sum up to zero, and
+# the matrix is no seminorm.)
 
 
 # %%
@@ -382,11 +382,11 @@ for ax, weights, title in zip(
 #
 # $$ P_{21} = \sum_b E_b' Q_b E_b . $$
 #
-# A displacement that vanishes at the ends of the contact is continued smoothly enough. Another one
-# gets a jump. In the double integral, the pairs with one point inside and one outside add a multiple
-# of $\int |u|^2 / \text{(distance to the end)}$. On a mesh this is at most $\max |u|^2$ times $\log N$.
-# Continue $u$ by its mirror image instead, so that there is no jump. The maximum is bounded by the
-# seminorm of this function, up to another logarithm:
+# A displacement that vanishes at the ends of the contact is continued smoothly enough. Any other
+# displacement gets a jump. In the double integral, the pairs with one point inside and one
+# outside add a multiple of $\int |u|^2 / \text{(distance to the end)}$. On a mesh this is at most
+# $\max |u|^2$ times $\log N$. Continue $u$ by its mirror image instead, so that there is no jump.
+# The maximum is bounded by the seminorm of this function, up to another logarithm:
 #
 # $$ \max |u| \le |u_0| + \sum_{k \ne 0} |u_k| \le |u_0| + \Bigl( \sum_{0 < |k| \le N} \frac{1}{|k|} \Bigr)^{1/2} |u| \;\lesssim\; |u_0| + (2 \log N)^{1/2}\, |u| . $$
 #
@@ -483,11 +483,11 @@ _ = right.set(xlim=(7, 700))
 #
 # ## Without a mesh
 #
-# A body that is large beside its contact may be modelled as a half-space, elastic everywhere below
-# a plane. Then nothing is meshed. $Q$ is a convolution with a function that is known exactly, so
-# that a product takes a few fast Fourier transforms. The dual program and the certificate stay the
-# same. Here a rigid sphere is pressed on a half-space, with 4,096 contacts, and compared with
-# Hertz's exact solution:
+# A body that is large compared with its contact may be modelled as a half-space, elastic
+# everywhere below a plane. Then nothing is meshed. $Q$ is a convolution with a function that is
+# known exactly, so that a product takes a few fast Fourier transforms. The dual program and the
+# certificate stay the same. Here a rigid sphere is pressed on a half-space, with 4,096 contacts,
+# and compared with Hertz's exact solution:
 
 # %%
 rubber, R, P = Material(E=5.0, nu=0.3), 400.0, 100.0

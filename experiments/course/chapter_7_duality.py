@@ -5,7 +5,7 @@
 # answer, and this chapter derives why. It also shows what the second program is good for: the
 # difference of the two values is an error that you can compute without knowing the solution.
 #
-# Read this chapter directly after chapter 2: its number does not say its place. The chapter takes 50
+# Read this chapter directly after chapter 2, although its number is 7. The chapter takes 50
 # minutes with its exercises.
 
 # %%
@@ -99,10 +99,10 @@ assert np.allclose(displacements.multipliers["reaction"], r, atol=1e-4)
 assert np.allclose(forces.multipliers["slip"], u[1], atol=1e-4)
 
 # %% [markdown]
-# The multipliers of each program are the variables of the other one. In the sketch every multiplier
-# is an arrow. Orange are the forces, which are the multipliers of the program in displacements.
-# Blue is the slip, which is the multiplier of the program in forces. The dotted node has not yet
-# slipped.
+# The multipliers of each program are the variables of the other one. In the sketch every
+# multiplier is an arrow. The forces are orange: they are the multipliers of the program in
+# displacements. The slip is blue: it is the multiplier of the program in forces. The dotted node
+# has not yet slipped.
 
 # %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(4.6, 2.6), layout="constrained")
@@ -224,17 +224,17 @@ _ = ax.margins(x=0)
 # ## What fails
 #
 # **Slater's condition.** In the program of associated friction the forces of a node lie in a cone
-# (chapter 2). Let the node in three dimensions be led by a rail, whose direction lies on the edge of
-# the cone: $\mu = 1$, $V = (1, -1, 0)'$, no load along the rail, and $q = (0, 0, 1)$ mm. The forces
-# must satisfy $V' r = 0$, that is $r_n = r_{t1}$, and $r_{t1}^2 + r_{t2}^2 \le r_n^2$. So $r_{t2} =
-# 0$: no admissible force lies inside the cone, and Slater's condition fails for the program in
-# forces. Its solution is $r = 0$ with the value zero.
+# (chapter 2). Let a rail guide the node in three dimensions. The direction of the rail lies on
+# the edge of the cone: $\mu = 1$, $V = (1, -1, 0)'$, no load along the rail, and $q = (0, 0, 1)$
+# mm. The forces must satisfy $V' r = 0$, that is $r_n = r_{t1}$, and $r_{t1}^2 + r_{t2}^2 \le
+# r_n^2$. So $r_{t2} = 0$: no admissible force lies inside the cone, and Slater's condition fails
+# for the program in forces. Its solution is $r = 0$ with the value zero.
 #
 # The program in displacements looks for $u = z + q + V\lambda$ with $u_n \ge |u_t|$. Without any
-# stretch this would need $\lambda \ge \sqrt{\lambda^2 + 1}$, which no $\lambda$ satisfies. But the
-# stretch that is missing falls like $1 / \lambda$. The energy comes as near to zero as we like, and
-# never reaches it. The values of both programs are equal, but *no displacement is a solution*:
-# the node runs away along the rail.
+# stretch this would need $\lambda \ge \sqrt{\lambda^2 + 1}$, which no $\lambda$ satisfies. But
+# the stretch that is needed falls like $1 / \lambda$. The energy comes as near to zero as we
+# like, and never reaches it. The values of both programs are equal, but *no displacement is a
+# solution*: the node runs away along the rail.
 
 # %%
 ways, energies = (1.0, 10.0, 100.0, 1000.0), []

@@ -20,22 +20,8 @@ import numpy as np
 
 from experiments.course.verdict import rounded
 
-NAMES = {
-    name: getattr(np, name)
-    for name in (
-        "sqrt",
-        "exp",
-        "log",
-        "log10",
-        "sin",
-        "cos",
-        "tan",
-        "arccos",
-        "ceil",
-        "floor",
-        "hypot",
-    )
-} | {"abs": abs, "pi": np.pi}
+FUNCTIONS = "sqrt exp log log10 sin cos tan arccos ceil floor hypot"
+NAMES = {name: getattr(np, name) for name in FUNCTIONS.split()} | {"abs": abs, "pi": np.pi}
 OTHERS = {
     "cos": "sin",
     "sin": "cos",
@@ -50,7 +36,15 @@ MOST_CHANGES, MOST_QUANTITIES = 60, 7
 ENOUGH_DIGITS = 4
 ANOTHER = "This is the value of `{}`, and another quantity is asked for."
 # changes that somebody makes less often than others, which explain an answer last, and never surely
-SELDOM = ("is squared", "another exponent", "under a square root", "takes the place")
+SELDOM = (
+    "is added to",
+    "right angle",
+    "is squared",
+    "another exponent",
+    "under a square root",
+    "takes the place",
+    "exchanged",
+)
 EXPONENTS = (0.5, 1 / 3, 2 / 3, 2.0, 3.0)
 # what may be done besides to the number that a mistake gives
 BESIDES: tuple[tuple[Callable[[float], float], str], ...] = (
@@ -173,7 +167,9 @@ def _everywhere(tree: ast.expr) -> Iterator[tuple[ast.expr, str]]:
 
 def _once_more(tree: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr, str]]:
     """The right answer times a quantity, or over it."""
-    for name in given if len(given) <= MOST_QUANTITIES else ():
+    for name, number in given.items() if len(given) <= MOST_QUANTITIES else ():
+        if abs(number) in (0.5, 1.0, 2.0):
+            continue  # a factor of two is told as such
         for op, done in ((ast.Mult(), "multiplied"), (ast.Div(), "divided")):
             node = tree
             for times in ("once", "twice"):
@@ -210,6 +206,8 @@ def taken(formula: str, given: Given) -> Found:
     """Numbers that come out if one quantity is taken too large or too small."""
     known, found = dict(given), []
     for (factor, told), (name, number) in product(TAKEN, given):
+        if formula.startswith("ceil") and number == round(number):
+            continue  # a count has no unit
         wrong = value(formula, known | {name: factor * number})
         if np.isfinite(wrong):
             found.append((wrong, f"Perhaps `{name}` is taken {told}: then this comes out."))
@@ -245,10 +243,12 @@ def changed(node: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr,
                 other_name = ast.Name(OTHERS[name], ast.Load())
                 yield ast.Call(other_name, [argument], []), f"`{OTHERS[name]}` replaces `{name}`"
             if name == "exp":
-                yield (
-                    ast.BinOp(ast.Constant(10.0), ast.Pow(), argument),
-                    "the base is 10, and not `e`",
-                )
+                power = ast.BinOp(ast.Constant(10.0), ast.Pow(), argument)
+                yield power, "the base is 10, and not `e`"
+                one = ast.Constant(1.0)
+                yield ast.BinOp(one, ast.Add(), argument), "`exp(x)` is taken for 1 + x"
+                inverse = ast.BinOp(one, ast.Div(), ast.BinOp(one, ast.Sub(), argument))
+                yield inverse, "`exp(x)` is taken for 1 / (1 - x)"
             if name in ("sin", "cos", "tan"):
                 turned = ast.BinOp(argument, ast.Mult(), ast.Constant(np.pi / 180))
                 yield ast.Call(node.func, [turned], []), "radians are taken for degrees"
@@ -274,6 +274,9 @@ def _changed_operation(
             yield ast.BinOp(left, flipped, right), f"the sign of `{second}` is wrong"
             yield left, f"`{second}` is left out"
             yield right, f"`{first}` is left out"
+            if isinstance(op, ast.Add):
+                sides = f"`{first}` and `{second}` are taken for the sides of a right angle"
+                yield ast.Call(ast.Name("hypot", ast.Load()), [left, right], []), sides
             if isinstance(right, ast.BinOp) and isinstance(right.op, ast.Pow):
                 whole = ast.BinOp(ast.BinOp(left, op, right.left), right.op, right.right)
                 yield whole, f"the exponent of `{ast.unparse(right.left)}` stands outside a bracket"
@@ -282,7 +285,10 @@ def _changed_operation(
             yield right, f"the factor `{first}` is left out"
             yield ast.BinOp(left, ast.Div(), right), WRONG_SIDE.format(second)
             yield ast.BinOp(right, ast.Div(), left), WRONG_SIDE.format(first)
-            yield ast.BinOp(left, ast.Add(), right), f"`{first}` is added to `{second}`: multiply"
+            yield (
+                ast.BinOp(left, ast.Add(), right),
+                f"`{first}` is added to `{second}`, and not multiplied",
+            )
             match left, right:
                 case ast.BinOp(a, ast.Add() | ast.Sub(), b), ast.BinOp(c, ast.Add() | ast.Sub(), d):
                     terms = ast.BinOp(a, ast.Mult(), c), ast.BinOp(b, ast.Mult(), d)
@@ -292,7 +298,8 @@ def _changed_operation(
             yield left, f"the division by `{second}` is left out"
             yield ast.BinOp(left, ast.Mult(), right), WRONG_SIDE.format(second)
             if first != "1":
-                yield ast.BinOp(right, ast.Div(), left), f"`{first}` and `{second}` are exchanged"
+                upside_down = f"the fraction of `{first}` and `{second}` is upside down"
+                yield ast.BinOp(right, ast.Div(), left), upside_down
                 inverse = ast.BinOp(ast.Constant(1.0), ast.Div(), right)
                 yield inverse, f"the factor `{first}` is left out"
                 yield ast.BinOp(inverse, ast.Div(), left), WRONG_SIDE.format(first)
@@ -300,6 +307,10 @@ def _changed_operation(
             yield ast.BinOp(left, op, both), f"you divide by `{first} + {second}`"
         case ast.Pow():
             yield left, f"the exponent `{second}` of `{first}` is left out"
+            yield (
+                ast.BinOp(left, ast.Mult(), right),
+                f"the exponent of `{first}` is taken for a factor",
+            )
             for exponent in EXPONENTS:
                 other = ast.BinOp(left, ast.Pow(), ast.Constant(exponent))
                 yield other, f"`{first}` has another exponent than `{second}`"
@@ -331,6 +342,8 @@ def _sums(formula: str, given: Given) -> Found:
     known, tree = dict(given), ast.parse(formula, mode="eval").body
     parts, found = dict(known), []
     for (first, a), (second, b) in combinations(known.items(), 2):
+        if first.split("_")[0] != second.split("_")[0] or "_" not in first:
+            continue  # a mean is taken of quantities of one kind
         found += [((a + b) / 2, ANOTHER.format(f"({first} + {second}) / 2"))]
         if a * b > 0:
             found += [((a * b) ** 0.5, ANOTHER.format(f"sqrt({first} * {second})"))]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import permutations
+from itertools import permutations, product
 from math import isclose
 from typing import Any
 
@@ -47,7 +47,7 @@ LOST = tuple(
     for f in (factor, 1 / factor)
 )
 # functions of the right answer that somebody gives in its place
-ANGLE = "This is the angle, and its tangent is asked for."
+ANGLE = "This is the angle whose tangent is the right answer."
 RELATED: tuple[tuple[Callable[[float], float], str], ...] = (
     (lambda x: 1 / x, "This is one over the right answer."),
     (lambda x: -1 / x, "This is one over the right answer, with the wrong sign."),
@@ -59,7 +59,10 @@ RELATED: tuple[tuple[Callable[[float], float], str], ...] = (
     (lambda x: x - 1, "This is the right answer minus one: a change, and not a ratio."),
     (lambda x: np.degrees(np.arctan(x)), ANGLE),
     (np.arctan, ANGLE),
-    (lambda x: np.sin(np.arctan(x)), "This is the sine of the angle whose tangent is asked for."),
+    (
+        lambda x: np.sin(np.arctan(x)),
+        "This is the sine of the angle whose tangent is the right answer.",
+    ),
     (np.log10, "This is the logarithm of the right answer."),
     (np.log, "This is the logarithm of the right answer."),
     (np.exp, "This is the exponential of the right answer."),
@@ -105,8 +108,8 @@ class Numbers:
     def resembles(self, answer: Any, value: Any) -> bool:
         """Whether an answer is this wrong value, perhaps rounded to two digits."""
         a, b = np.asarray(answer, dtype=float), np.asarray(value, dtype=float)
-        if a.shape != b.shape:
-            return False
+        if a.shape != b.shape or self.counts:
+            return np.array_equal(a, b)
         pairs = zip(a.ravel(), b.ravel(), strict=True)
         return self.agrees(a, b) or all(_same_digits(x, y, self.close) for x, y in pairs)
 
@@ -121,7 +124,8 @@ class Numbers:
             if " " in told and self.resembles(answer, other):
                 return wrong("mistake", told)
         if value.size == 1:
-            return self._one(float(answer.ravel()[0]), 0) or self._size(answer, value)
+            alone = float(answer.ravel()[0])
+            return self._one(alone, 0, listed) or self._size(answer, value)
         return self._several(answer, value)
 
     def _rounded(self, answer: np.ndarray, value: np.ndarray) -> bool:
@@ -135,23 +139,25 @@ class Numbers:
             for a, b in pairs
         )
 
-    def _one(self, answer: float, i: int) -> Verdict | None:
-        """What is wrong with number i, if it is a typical mistake."""
+    def _one(self, answer: float, i: int, listed: Sequence[tuple[Any, str]] = ()) -> Verdict | None:
+        """What is wrong with number i, if it is a typical mistake; the likeliest come first."""
         right = float(np.ravel(self.value)[i])
         if self.counts and answer != round(answer):
             return wrong("count", "A count is a whole number.")
         if self.counts and abs(answer - right) == 1:
             return wrong("count", "It is one too many or one too few. Look at the ends again.")
-        for kind, factor, told in SCALED:
-            if self.agrees_alone(factor * answer, right):
-                return wrong(kind, told)
         return (
-            self._from_formula(answer, i)
+            _scaled(answer, right, self.agrees_alone)
+            or (None if self.counts else _scaled(answer, right, _same_digits, SCALED[:-2]))
+            or self._from_formula(answer, i, likely=True)
             or self._given(answer)
             or self._related(answer, right)
+            or self._from_formula(answer, i, likely=False)
+            or _besides(answer, listed)
             or self._two_mistakes(answer, i)
             or self._other_quantity(answer, i)
             or self._taken(answer, i)
+            or (None if self.counts else _scaled(answer, right, _same_digits, SCALED[-2:]))
             or self._outside(answer)
         )
 
@@ -164,13 +170,18 @@ class Numbers:
     def _formula(self, i: int) -> str:
         return self.formulas[i] if i < len(self.formulas) else repr(float(np.ravel(self.value)[i]))
 
-    def _from_formula(self, answer: float, i: int) -> Verdict | None:
-        """One mistake: to all digits that are given, nearly, or rounded."""
+    def _from_formula(self, answer: float, i: int, likely: bool) -> Verdict | None:
+        """One mistake, likely or not: to all digits that are given, nearly, or rounded."""
         given = tuple(self.given.items())
-        mistakes = wrong_values(self._formula(i), given, tuple(self.chapter.items()))
-        for same in (fits, self.agrees_alone, _same_digits):
+        mistakes = [
+            one
+            for one in wrong_values(self._formula(i), given, tuple(self.chapter.items()))
+            if one[1].startswith("Perhaps") != likely
+        ]
+        for same in (fits, self.agrees_alone, *(() if self.counts else (_same_digits,))):
             for number, told in mistakes:
-                if same(answer, number):
+                # two digits fit to the square of a quantity by chance
+                if same(answer, number) and (same is not _same_digits or "twice more" not in told):
                     return wrong("formula", told)
         return None
 
@@ -184,7 +195,7 @@ class Numbers:
     def _related(self, answer: float, right: float) -> Verdict | None:
         """Whether an answer is a factor or a function away from the right one."""
         with np.errstate(all="ignore"):
-            ways = [(right / factor, kind, told) for kind, factor, told in LOST]
+            ways = [(right / factor, kind, told) for kind, factor, told in LOST if not self.counts]
             ways += [(float(f(np.float64(right))), "related", told) for f, told in RELATED]
         near = [one for one in ways if self.agrees_alone(answer, one[0])]
         best = min(near, key=lambda one: abs(one[0] - answer), default=None)
@@ -195,7 +206,8 @@ class Numbers:
         formula, given = self._formula(i), tuple(self.given.items())
         for change, besides in BESIDES:
             for number, told in wrong_values(formula, given, tuple(self.chapter.items())):
-                if number and fits(answer, change(number)):
+                alone = "of the text" in told or "right answer" in told
+                if number and not alone and fits(answer, change(number)):
                     return wrong("formula", f"{told} {besides}")
         for number, told in two_mistakes(formula, given):
             if fits(abs(answer), abs(number)):
@@ -277,6 +289,25 @@ def by_hand(
     numbers: Any = [int(x) for x in found] if formulas[0].startswith("ceil") else found
     whole = numbers[0] if len(numbers) == 1 else tuple(numbers)
     return Numbers(whole, close, tuple(formulas), given, least, most, chapter or {})
+
+
+def _scaled(
+    answer: float,
+    right: float,
+    same: Callable[[float, float], bool],
+    ways: Sequence[tuple[str, float, str]] = SCALED,
+) -> Verdict | None:
+    """Whether an answer has the wrong sign, another unit or a factor of two."""
+    found = (wrong(kind, told) for kind, factor, told in ways if same(answer, right / factor))
+    return next(found, None)
+
+
+def _besides(answer: float, listed: Sequence[tuple[Any, str]]) -> Verdict | None:
+    """Whether an answer is a wrong answer of this exercise with another mistake besides."""
+    for (other, told), (change, besides) in product(listed, BESIDES):
+        if " " in told and other and fits(answer, change(float(other))):
+            return wrong("mistake", f"{told} {besides}")
+    return None
 
 
 def _same_digits(answer: float, value: float, close: float = CLOSE) -> bool:

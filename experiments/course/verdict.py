@@ -27,8 +27,8 @@ def wrong(kind: str, sentence: str, contact: int | None = None) -> Verdict:
 
 
 def rounded(x: float, digits: int) -> float:
-    """x with so many digits."""
-    return float(f"{x:.{digits}g}")
+    """x with so many digits; half a unit, also if the computer has a little less, is rounded up."""
+    return float(f"{x * (1 + 1e-12):.{digits}g}")
 
 
 def shortened(x: float, digits: int) -> tuple[float, float]:

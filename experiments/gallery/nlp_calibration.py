@@ -1,7 +1,7 @@
 """Calibration from a measured loop.
 
 Class: nonlinear least squares with exact derivatives. Mechanics: two cylinders
-are pressed together and pushed to and fro. Their shift tells E and mu.
+are pressed together and pushed to and fro. Their shift determines E and mu.
 """
 
 import matplotlib.pyplot as plt

@@ -1,4 +1,4 @@
-"""What separation is worth.
+"""Contacts that open, and contacts that pull.
 
 Class: quadratic program. Mechanics: the same load with contacts that may open and with contacts
 that may pull.

@@ -1,7 +1,7 @@
 """The cone as a pyramid.
 
 Class: quadratic program for a cone program. Mechanics: associated friction at one contact in
-three dimensions. A pyramid with m facets errs like 1 / m^2.
+three dimensions. The error of a pyramid with m facets falls like 1 / m^2.
 """
 
 import matplotlib.pyplot as plt

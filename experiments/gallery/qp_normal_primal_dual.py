@@ -1,7 +1,7 @@
 """Contact without friction, in forces and in displacements.
 
 Class: quadratic program and its dual. Mechanics: a block pressed on a foundation. The multipliers
-of the one program are the unknowns of the other.
+of one program are the unknowns of the other.
 """
 
 import matplotlib.pyplot as plt

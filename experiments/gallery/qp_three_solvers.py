@@ -1,7 +1,7 @@
 """OSQP, Clarabel and SCS: how accurate are they?
 
-Class: quadratic program. Mechanics: Tresca friction. All three are asked with their own settings;
-the measure is the distance from the primal value.
+Class: quadratic program. Mechanics: Tresca friction. All three run with their own settings. The
+measure is the distance from the primal value.
 """
 
 import matplotlib.pyplot as plt

@@ -1,7 +1,7 @@
 """A warm start.
 
-Class: sequence of problems. Mechanics: the same block with a little more friction. The solution
-before is a good first guess.
+Class: sequence of problems. Mechanics: the same block with a little more friction. The previous
+solution is a good first guess.
 """
 
 import matplotlib.pyplot as plt

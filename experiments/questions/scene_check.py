@@ -79,7 +79,7 @@ these numbers?
 Each run is a process of its own; the peak is its largest resident memory, with Python and its
 packages.
 """
-    write("scene_check", "What a run will cost, told before it", text, {"estimates": rows}, {})
+    write("scene_check", "The predicted cost of a run", text, {"estimates": rows}, {})
 
 
 if __name__ == "__main__":

@@ -388,28 +388,30 @@ the others are in units of N and mm:
 {{scenes}}
 
 **Cost.** The table has CPU seconds, medians on a shared machine, with `OMP_NUM_THREADS=1`. It
-compares the gradient of one function by all data (q, mu, s, Q, V) with the whole solve. The
-gradient takes the certificate of the solution and one solve with the transposed system. The dense
-rows take the Cholesky factor that Newton's method has made. It is kept for the problem that was
-factorised last, as long as that problem is in use. The column "anew" is the gradient of a copy of
-the problem, for which no factor is kept. With multigrid the certificate takes one V-cycle, since
-the solution has the displacements of the bodies. The coupled linear system is solved to the
-certificate of the solution, at most to 1e-11, because its matrix is not known better. Every V-cycle
-about halves what is left. So ten digits of a gradient take about as many V-cycles as all steps of
-Newton's method, which are inexact, and this row stays near the whole solve.
+compares the gradient of one function with respect to all data (q, mu, s, Q, V) with the whole
+solve. The gradient takes the certificate of the solution and one solve with the transposed
+system. The dense rows use the Cholesky factor that Newton's method has made. This factor is kept
+for the problem that was factorised last, as long as that problem is in use. The column "anew" is
+the gradient of a copy of the problem, for which no factor is kept. With multigrid the certificate
+takes one V-cycle, since the solution has the displacements of the bodies. The coupled linear
+system is solved to the certificate of the solution, at most to 1e-11, because the matrix itself
+is not known more exactly. Every V-cycle about halves the error. So ten digits of a gradient take
+about as many V-cycles as all steps of Newton's method, which are inexact, and this row stays near
+the whole solve.
 
 {{costs}}
 
 **JAX.** `contactopt.jax.solve` is compared with central differences along a random direction of q,
 over the norms of the forces and of the weights. Times are medians of CPU milliseconds, compiled and
-warm. The acts of a row are timed in turn. "Gradient over value" is the time of value and gradient
-by Q, q, mu and V together, less that of the value, over that of the value, all by JAX. The last
-column is over `contactopt.solve` without JAX. A gradient takes no call of NumPy more than the
-value: the call that solves the problem gives the factors of the linear system as well, and XLA
-solves with them. "An empty call" has the arrays of the value and computes nothing. "Factors" is the
-time to assemble and factorise that system alone, below which no gradient is. A curved contact takes
-eight to ten steps of Newton's method. A flat punch takes two steps with one Cholesky factor, and
-problems without a plate are swept without any factor: there the factors of the gradient weigh most.
+warm. The tasks of a row are timed in turn. For "gradient over value", JAX computes the value and
+the gradient with respect to Q, q, mu and V together; the time of the value is subtracted, and the
+rest is divided by it. The last column divides by the time of `contactopt.solve` without JAX. A
+gradient takes no more calls of NumPy than the value: the call that solves the problem gives the
+factors of the linear system as well, and XLA solves with them. "An empty call" has the arrays of
+the value and computes nothing. "Factors" is the time to assemble and factorise that system alone.
+No gradient can be faster. A curved contact takes eight to ten steps of Newton's method. A flat
+punch takes two steps with one Cholesky factor, and problems without a plate are swept without any
+factor: there the factors of the gradient weigh most.
 
 {{jax}}
 

@@ -36,7 +36,7 @@ folder = TemporaryDirectory()
 # computes the certificate of each answer.
 #
 # Methods run in processes of their own, so that the benchmark can end them if they take too long.
-# Therefore they stand in a file of their own. Here is the first one.
+# Therefore a method is written into a file. Here is the first one.
 #
 # **First idea: walk downhill.** Let $K$ be the set of all forces with $|r_t| \le \mu r_n$, and let
 # $P_K$ take a vector to the nearest force in $K$. The map $r \mapsto P_K(r - \rho (u + \mu |u_t|

@@ -133,8 +133,8 @@ assert np.isclose(
 # At $\mu = 5/6$ the friction force is at its bound although the node does not move. Such a contact
 # is called *weakly active*. Here the solution has no derivative, but it has one on each side.
 # `sensitivity` names the contact, and `forward` gives the slope of the side to which the direction
-# points. To find it, it solves a small complementarity problem: does the contact stick or slip if
-# we move this way?
+# points. To find this slope, `forward` solves a small complementarity problem: does the contact
+# stick or slip if we move this way?
 
 # %%
 problem, solution = solved(5 / 6)
@@ -162,8 +162,8 @@ assert not np.allclose(
 # The outer problem is called the *leader*, which chooses $\mu$. The contact is the *follower*,
 # which answers with a solution. There are three ways to write this.
 #
-# - If the follower minimises something, as contact without friction does, the whole is a **bilevel
-#   program**.
+# - If the follower minimises something, as contact without friction does, the whole problem is a
+#   **bilevel program**.
 # - The conditions of the follower, $u_n \ge 0$, $r_n \ge 0$, $u_n r_n = 0$ and so on, can be
 #   written as constraints of the leader. Then the whole is a **mathematical program with
 #   equilibrium constraints**, an MPEC. It is awkward for solvers of nonlinear programs. At *every*

@@ -30,12 +30,12 @@ print(
 # %% [markdown]
 # ## What a half-space is here
 #
-# We put points on a square of the surface, evenly spaced by $h$. Each point stands for a cell of $h
-# \times h$ that carries a uniform traction. A unit of force on one cell moves the middle of another
-# cell by the integral of $1/\rho$ over the loaded cell, up to a constant factor. ($\rho$ is the
-# distance.) Love wrote this integral down in closed form in 1929. It depends on the distance of the
-# two cells alone. So $Q$ is a convolution, and a product $Qr$ costs a few fast Fourier transforms,
-# whatever the shape of the contact.
+# We put points on a square of the surface, evenly spaced by $h$. Each point represents a cell of
+# $h \times h$ that carries a uniform traction. A unit of force on one cell moves the middle of
+# another cell by the integral of $1/\rho$ over the loaded cell, up to a constant factor. ($\rho$
+# is the distance.) Love wrote this integral down in closed form in 1929. It depends on the
+# distance of the two cells alone. So $Q$ is a convolution, and a product $Qr$ costs a few fast
+# Fourier transforms, whatever the shape of the contact.
 
 # %%
 a = exact.half_width
@@ -135,16 +135,16 @@ assert spaced[-1, 0] < spaced[0, 0] / 3
 # %% [markdown]
 # The half-space is three-dimensional and does not use the symmetry, yet it costs no more. Finite
 # elements in three dimensions would need about a hundred times the unknowns of the section. The
-# rule is: *model no more than a scene needs*. If the bodies are large beside the contact, we need
-# no mesh of their volume.
+# rule is: *model no more than a scene needs*. If the bodies are large compared with the contact,
+# we need no mesh of their volume.
 #
 # ## When the half-space is wrong
 #
 # The half-space rests on two assumptions. The slopes of the surfaces are small, so the contact
-# radius $a$ is much smaller than the radius $R$ of the sphere. And the body is large beside the
-# contact, so its thickness $H$ is many times $a$. Let us break the second assumption. We make the
-# block thinner, from 40 to 2 contact radii, and glue it to a rigid floor. The half-space stays what
-# it is.
+# radius $a$ is much smaller than the radius $R$ of the sphere. And the body is large compared
+# with the contact, so its thickness $H$ is many times $a$. Let us break the second assumption. We
+# make the block thinner, from 40 to 2 contact radii, and glue it to a rigid floor. The half-space
+# stays what it is.
 
 # %%
 thickness = np.array([2.0, 4.0, 8.0, 16.0, 40.0])

@@ -5,7 +5,7 @@
 # friction. With friction this
 # need not be so. This tutorial shows problems with a single contact that have three solutions,
 # exactly two, and none at all. It also shows a method that runs in circles although there is
-# exactly one solution. And it shows the tools that tell you all this before you solve.
+# exactly one solution. And it shows the tools that find all this before you solve.
 #
 # Reading time: 10 minutes. [Chapter 2](../course/chapter_2_friction_at_one_node.py) of the course
 # explains the letters. The pages of [the museum](../museum.md#one-node-one-solution-or-three) show

@@ -260,7 +260,7 @@ assert ours[129] <= ours[17] + 4
 # | name | what it is |
 # |---|---|
 # | `p21` | the paper's equation 25: a *sparse* circulant for the $H^{1/2}$ seminorm, extended by zero |
-# | `p22` | the paper's equation 26: the inverse of a sparse circulant form of $Q$ itself |
+# | `p22` | the paper's equation 26: the inverse of a sparse circulant approximation of $Q$ |
 # | `neumann` | the square root of the Laplacian of the contact line, by the cosine transform |
 #
 # The trick of the paper is a circulant matrix that is sparse. It has about $2 \log_2 N$ entries per
@@ -449,7 +449,7 @@ assert abs(motion[:, 1].sum()) > 0.99 * np.sqrt(nodes) * np.linalg.norm(
 #
 # <details><summary>Solution</summary>
 #
-# Under a power below one, short waves remain too small in $P Q$; under a power above one, they
+# With a power below one, short waves remain too small in $P Q$. With a power above one, they
 # become too large.
 #
 # ```python

@@ -160,7 +160,7 @@ def taken(words: dict[str, Any]) -> str:
     """What is taken away so that the method solves the problem."""
     settings = [f"`{key} = {value:g}`" for key, value in words.get("settings", {}).items()]
     cure = settings[0] if settings else words.get("cure")
-    return f" Proof: with {cure} it solves the problem." if cure else ""
+    return f" Check: with {cure} the method solves this problem." if cure else ""
 
 
 def numbers(case: Case) -> str:

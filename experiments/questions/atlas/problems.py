@@ -183,7 +183,7 @@ class End:
         if not self.failed:
             return "solves"
         if self.status in ("solved",):
-            return "claims falsely"
+            return "falsely claims success"
         if self.status in ("backend_failed", "diverged", "settled", "error"):
             return "breaks down"
         if self.status == "stalled":

@@ -96,10 +96,11 @@ TEXT = """
 
 **How a value is found.** Each scene is solved on two sequences of meshes that share no mesh. The
 first has displacements of degree 1, the second of degree 2. The meshes of a sequence are halved
-everywhere, and the limit is extrapolated from the last three values. What that limit differs from
-the one before is its bar, and at least half of what it differs from the last value. The value is
-the limit with the smaller bar. Its own bar here is that one, or the difference of the two limits if
-this is larger. `values.csv` has the limits, orders, unknowns and seconds of both ways.
+everywhere, and the limit is extrapolated from the last three values. The bar of a limit is its
+difference from the previous limit, and at least half of its difference from the last value. The
+reported value is the limit with the smaller bar. The reported bar is that bar, or the difference
+of the two limits if this is larger. `values.csv` has the limits, orders, unknowns and seconds of
+both ways.
 
 {small}
 
@@ -117,25 +118,27 @@ by 200 mm under 35 kN / mm, loaded by a plate that does not tilt. The rounded pu
 has diameter and height 100 mm and a fillet of 10 mm at its edge. A pressure of 100 MPa on its top
 presses it on an aluminium block of diameter and height 200 mm. NAFEMS clamps this block below.
 
-**What is exact.** Exact are Spence's stick share of a rigid flat punch, Lame's press fit and
-Cattaneo's stick share. The contact of layers follows from integral equations, which are solved in
-`zone_equation.py`. A layer without weight on a rigid base lifts off beyond a half-width that does
-not depend on the load (after Keer, Dundurs, Tsai 1972). A cylinder on layers needs their compliance
-over the wave number, which `layered.py` has. A bulk tension in one of Cattaneo's cylinders, at the
-same time as the shear, moves the zone of stick by .3 of the half-width and leaves its size (Hills,
-Nowell 1994, Mechanics of Fretting Fatigue). The resultant of friction moves to the other side. The
-blocks of Spence and Cattaneo are finite, which the exact values are not.
+**What is exact.** Exact values are known for Spence's stick share of a rigid flat punch, Lame's
+press fit and Cattaneo's stick share. The contact of layers follows from integral equations, which
+are solved in `zone_equation.py`. A layer without weight on a rigid base lifts off beyond a
+half-width that does not depend on the load (after Keer, Dundurs, Tsai 1972). A cylinder on layers
+needs their compliance over the wave number, which `layered.py` has. A bulk tension in one of
+Cattaneo's cylinders, at the same time as the shear, moves the zone of stick by .3 of the
+half-width and leaves its size (Hills, Nowell 1994, Mechanics of Fretting Fatigue). The resultant
+of friction moves to the other side. The blocks of Spence and Cattaneo are finite, but the exact
+values are those of infinite bodies.
 
 **Where digits are missing.** Widths are read from the pressure next to the edge, and they are the
 least certain quantity. The stick share next to a corner has the fewest digits. Approaches have
 second order and give five digits or six, and so do peaks in the middle of a smooth contact. The
 peak under the punch x^4 is off the middle, and between two nodes.
 
-**How a width is read.** The zero of a parabola through p^2 over x^2 is exact where the pressure is
-that of Hertz. Under the punch x^4 it stays more than 1 % too far out on any mesh, on both ways.
-A root times a polynomial, which fit the pressure over the share of the half-width that leaves the
-least standard error, has no such limit. Where linear elements grow or shrink, the force of a node
-over its area is the traction beside it, and is read there. `tests/test_edges.py` has the pressures.
+**How a width is read.** Fit a parabola to p^2 as a function of x^2: its zero is exact for the
+pressure of Hertz. Under the punch x^4 this zero stays more than 1 % too far out on any mesh, on
+both ways. Therefore the product of a root and a polynomial is fitted to the pressure, over the
+share of the half-width with the smallest standard error. This fit has no such limit. Where linear
+elements grow or shrink, the force of a node over its area is the traction at a place beside the
+node, and is read there. `tests/test_edges.py` has the pressures.
 
 **Named scenes on their default meshes.** The true value is exact, or it is the limit of three
 meshes of degree 2. A quantity is judged where the bar of that limit is at most half of what is

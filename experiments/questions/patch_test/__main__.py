@@ -1,4 +1,4 @@
-"""Does every pair of surfaces pass a constant pressure on, or say where it does not? `python -m
+"""Does every pair of surfaces transmit a constant pressure, or say where it does not? `python -m
 experiments.questions.patch_test [PAIRS [FIRST]]`.
 """
 

@@ -1,4 +1,4 @@
-"""Whether a pair passes a constant pressure on, by means that share nothing with the check."""
+"""Whether a pair transmits a constant pressure, by means that share nothing with the check."""
 
 from __future__ import annotations
 
