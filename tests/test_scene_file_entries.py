@@ -151,7 +151,7 @@ def test_steps_have_names_and_grow_from_the_step_before(tmp_path):
     named = read_scene_file(written(tmp_path, 'steps = ["press", "push"]\n' + steps)).states
     assert [state.bodies[0].loads[0].force["x"] for state in named] == [0.0, 3.0]
     for wrong, said in (
-        ('steps = ["press"]\n', "values for 2 steps, but there are 1"),
+        ('steps = ["press"]\n', "values for 2 steps, the file has 1"),
         ('steps = [{ name = "press", states = 0 }]\n', "states of step 'press' must be"),
         ("steps = [1]\n", "every entry of 'steps'"),
         ("steps = 1\n", "'steps' must be an array; got 1"),

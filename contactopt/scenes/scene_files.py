@@ -91,8 +91,9 @@ def read_scenes(
     wanted = len(reading.steps) or longest
     for length, at, key in reading.lengths:
         if length not in (1, wanted):
-            what, whose = ("step", "steps") if reading.steps else ("state", "other numbers")
-            said = f"{key!r} has values for {count(length, what)}, {whose} for {wanted}."
+            what = "step" if reading.steps else "state"
+            rest = f"the file has {wanted}" if reading.steps else f"other numbers for {wanted}"
+            said = f"{key!r} has values for {count(length, what)}, {rest}."
             raise at.fail(said, key)
     total = sum(states for _, states in reading.steps) or longest
     states = [first]
