@@ -92,6 +92,17 @@ def test_options_of_the_command_line_join_those_of_the_file(tmp_path):
         contactopt.run(file, max_unknwns=9, **aim)
 
 
+def test_a_file_may_ask_for_the_accuracy_of_a_load_path(tmp_path):
+    aim = 'accuracy = 0.5\nquantity = "approach"\nmax_unknowns = 2000'
+    text = SMALL.replace("tol = 1e-10", aim).replace("y = -10.0", "y = [-5.0, -10.0]")
+    result = contactopt.run(written(tmp_path, text))
+    given = contactopt.run(
+        written(tmp_path, text.replace(aim, "")), accuracy=0.5, quantity="approach"
+    )
+    assert result.estimate.target == 0.5 and len(result.path.states) == 2
+    assert result.summary["approach"] == pytest.approx(given.summary["approach"], rel=1e-9)
+
+
 def test_every_entry_reaches_the_scene(tmp_path):
     plane = skfem.MeshTri2.init_circle(2)
     meshio.write(
