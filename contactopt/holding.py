@@ -379,6 +379,7 @@ class _Push:
                     continue
                 return np.nan, False
             before, f, last, r = f, -float(v @ now.reactions.ravel()) - rest, r, now.reactions
+            f = f if abs(f) > self.nothing else 0.0
             note(f"push {push + 1}: {f:.6g} times the load")
             slope = abs(f - before) / ((1 - 1 / GROWTH * (push > 1)) * d or np.inf)
             steepest = np.fmax(steepest, slope)
@@ -442,4 +443,6 @@ def _apart(found: list[Found]) -> str:
     most = np.max([abs(a - b) / abs(b) if b else np.inf for a, b in ends if a != b], initial=0.0)
     if not np.isfinite(most):
         return "a coarser mesh gives another answer, so that this one is uncertain"
+    if most <= STEADY:
+        return f"two meshes differ by less than {100 * STEADY:g} %"
     return f"two meshes differ by {100 * most:.1g} %"
