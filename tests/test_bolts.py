@@ -37,14 +37,14 @@ def block(mesh, low, high, turned=None, across=4):
     return made if turned is None else replace(made, doflocs=turned @ made.p)
 
 
-def clamp(mesh=MeshHex, turned=None, loads=((), ()), bolts=None, kind="solid", across=8):
+def clamp(mesh=MeshHex, turned=None, loads=((), ()), bolts=(), kind="solid", across=8):
     """A block that only contact and a bolt hold, on a block that is clamped at its side."""
     upper, lower = block(mesh, 1, 2, turned), block(mesh, 0, 1, turned, across)
     parts = (
         Part("up", upper, STEEL, (), loads[0]),
         Part("down", lower, STEEL, (Support("side"),), loads[1]),
     )
-    return Scene("clamp", *parts, MU, kind=kind, bolts=bolts)
+    return Scene("clamp", *parts, MU, kind=kind).with_bolts(bolts)
 
 
 def test_a_scene_lists_its_bolts():
@@ -55,8 +55,8 @@ def test_a_scene_lists_its_bolts():
     assert one == Bolt(FACES, F, "m4", False)
     assert two == Bolt(FACES, 2 * F, "bolt2", direction=(0, 0, 1))
     assert replace(bolted, mu=0.1).bolts == bolted.bolts
-    assert replace(clamp(), bolts=tuple(bolted.bolts)).bolts == bolted.bolts
-    assert replace(bolted, bolts=()).bolts == ()
+    assert clamp().with_bolts(bolted.bolts).bolts == bolted.bolts
+    assert bolted.with_bolts(()).bolts == ()
     changed = bolted.with_parts(
         lambda part: replace(part, loads=tuple(load.with_values({"": 3.0}) for load in part.loads))
     )
@@ -78,7 +78,7 @@ def test_stiff_bolts_whose_faces_share_nodes_are_named():
         "the bolt 'm5', whose face 'beside' .* but the bolt 'm4', whose face 'head' .*let a bolt"
     )
     with pytest.raises(InputError, match=words):
-        contactopt.reduce(replace(scene, bolts=both))
+        contactopt.reduce(scene.with_bolts(both))
 
 
 @pytest.mark.parametrize("tilting", [True, False])
@@ -138,7 +138,7 @@ def test_half_a_clamp_has_half_of_its_bolt_or_one_of_two(two, tilting):
         bolts = tuple(Bolt((f"up.head{i}", f"down.nut{i}"), F / 2, tilting=tilting) for i in (1, 2))
     whole = clamp(across=4)
     whole = whole.with_parts(lambda part: replace(part, mesh=halves(part.mesh)))
-    whole = replace(whole, bolts=bolts)
+    whole = whole.with_bolts(bolts)
     half = simplify(whole).scene
     assert half.copies == 2 and len(half.bolt_ends) == 1
     one, other = (contactopt.run(scene) for scene in (whole, half))
@@ -158,7 +158,7 @@ def test_a_mirror_that_swaps_the_ends_of_a_bolt_is_refused(way):
     part = Part("up", mesh, STEEL, (), load, contact="wall")
     scene = Scene("s", part, contactopt.Rigid("wall"), 0.3)
     assert simplify(scene).scene.copies == 2
-    found = simplify(replace(scene, bolts=(Bolt(("up.head", "up.nut"), F, direction=way),)))
+    found = simplify(scene.with_bolts((Bolt(("up.head", "up.nut"), F, direction=way),)))
     assert found.scene.copies == 1 and "bolt 'bolt1' has 1 end" in "".join(found.notes)
 
 

@@ -7,7 +7,7 @@ system is the user's; the named scenes (contactopt.scenes) use newton, millimetr
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import InitVar, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,10 +44,6 @@ __all__ = [
 MOST_ACROSS = 100_000  # elements across the contact half-width
 
 
-class Listed(tuple[Bolt, ...]):
-    """Bolts that the bodies of a scene have already; dataclasses.replace hands them on."""
-
-
 @dataclass(frozen=True)
 class Scene:
     """Bodies that may touch each other.
@@ -69,9 +65,6 @@ class Scene:
                `copies` is then 2 for each unless it is given. None: where copies > 1, the planes
                are those on which supports hold the normal alone
     state      name of the step of a load path to which this state belongs
-    bolts      that pull faces of the bodies together; their ends become loads of the bodies, which
-               `bolt_ends` lists. None: those that the bodies have. The attribute lists the bolts
-               that the bodies have now; to put those of another scene, give tuple(other.bolts)
     degree     of the displacement in every element: 1, linear, or 2, quadratic; 2 for nearly
                incompressible bodies, where linear elements lock. By default that of the meshes: 2
                if one that is given has elements of second order, else 1.
@@ -102,9 +95,8 @@ class Scene:
     contacts: tuple[Contact, ...] = ()
     mirror: str | None = None
     state: str = ""
-    bolts: InitVar[tuple[Bolt, ...] | None] = None
 
-    def __post_init__(self, bolts: tuple[Bolt, ...] | None) -> None:
+    def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise InputError(f"the scene's name must be a text; got {short(self.name)}.")
         if not isinstance(self.kind, str) or self.kind not in KINDS:
@@ -116,8 +108,6 @@ class Scene:
                     "a body must be a Part, a MatrixPart, a Rigid or a HalfSpace; got"
                     f" {short(part)}."
                 )
-        if bolts is not None and not isinstance(bolts, Listed):
-            self._put(bolts)
         check_size("the thickness", self.thickness, low=0.0)
         if self.zone is not None:
             check_number("the contact zone's half-width", self.zone, low=0.0)
@@ -197,14 +187,19 @@ class Scene:
                     found.setdefault(load.address(part.name)[0], []).append((part, load))
         return found
 
-    def _put(self, bolts: Sequence[Bolt]) -> None:
-        """Give the bodies the ends of these bolts, in place of those that they had."""
-        parts = with_bolts(self.parts, bolts)
-        names = ("upper", "lower") if self.upper is not None else ()
-        for name, part in zip(names, parts):
-            object.__setattr__(self, name, part)
-        if not names:
-            object.__setattr__(self, "bodies", parts)
+    @property
+    def bolts(self) -> tuple[Bolt, ...]:
+        """The bolts between the bodies, as their loads have them."""
+        made = []
+        for name, ((one, first), (other, last)) in self.bolt_ends.items():
+            faces = f"{one.name}.{first.boundary}", f"{other.name}.{last.boundary}"
+            made.append(Bolt(faces, first.pull, name, first.tilting, first.direction))
+        return tuple(made)
+
+    def with_bolts(self, bolts: Sequence[Bolt]) -> Scene:
+        """The scene with these bolts in place of its own; their ends become loads of the bodies."""
+        bolted = {part.name: part for part in with_bolts(self.parts, bolts)}
+        return self.with_parts(lambda part: bolted[part.name])
 
     def surfaces_of(self, part: Part | MatrixPart) -> tuple[str, ...]:
         """The boundaries of a part that contacts use, each once, in the order of the pairs."""
@@ -320,19 +315,6 @@ class Scene:
         for name in names:
             if not any(name in pair.bodies for pair in pairs):
                 raise self._wrong(f"body '{name}' belongs to no contact; drop it or give it one.")
-
-
-def _bolts(scene: Scene) -> Listed:
-    """The bolts of a scene, as its bodies have them now."""
-    made = []
-    for name, ends in scene.bolt_ends.items():
-        (one, first), (other, last) = ends
-        faces = f"{one.name}.{first.boundary}", f"{other.name}.{last.boundary}"
-        made.append(Bolt(faces, first.pull, name, first.tilting, first.direction))
-    return Listed(made)
-
-
-Scene.bolts = property(_bolts)  # type: ignore[attr-defined]
 
 
 def check_units(units: object) -> None:
