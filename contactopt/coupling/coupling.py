@@ -133,7 +133,7 @@ def couple(
             why = f"the nodes match, but {made.fails.partition(': ')[2].partition(';')[0]}"
     if made.kind != ways[0]:
         log.info("contact '%s' is coupled by %s: %s", pair.name, made.kind, why)
-    if made.share is not None and (ends := np.count_nonzero(made.share < COVERED)):
+    if made.share is not None and (ends := int(np.sum(made.share < COVERED))):
         why += (
             f"; the other surface ends within the faces of {count(ends, 'contact')}, whose"
             " pressure is the force over the part that it covers"
