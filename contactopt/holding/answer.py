@@ -86,4 +86,6 @@ def _apart(found: list[Found]) -> str:
     most = np.max([abs(a - b) / abs(b) if b else np.inf for a, b in ends if a != b], initial=0.0)
     if not np.isfinite(most):
         return "a coarser mesh gives another answer, so that this one is uncertain"
+    if most <= STEADY:
+        return f"two meshes differ by less than {100 * STEADY:g} %"
     return f"two meshes differ by {100 * most:.1g} %"

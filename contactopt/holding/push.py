@@ -119,6 +119,7 @@ class Push:
                     continue
                 return np.nan, False
             before, f, last, r = f, -float(v @ now.reactions.ravel()) - rest, r, now.reactions
+            f = f if abs(f) > self.nothing else 0.0
             note(f"push {push + 1}: {f:.6g} times the load")
             slope = abs(f - before) / ((1 - 1 / GROWTH * (push > 1)) * d or np.inf)
             steepest = np.fmax(steepest, slope)
