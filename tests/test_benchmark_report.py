@@ -318,7 +318,7 @@ def test_findings_say_what_the_table_lacks(path):
     layout = read_layout(path)
     table, lacking = benchmark.load(REPORTS / layout.name), 0
     for column in {"setting", "name", "family", "success"} & {*table}:
-        for value in table[column].unique()[:2]:
+        for value in table[column].unique()[:1]:
             rows = table[table[column] == value]
             own = [name for name in rows if "." in name and rows[name].isna().all()]
             found = made_reports._findings(layout, rows.drop(columns=own))
