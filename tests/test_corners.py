@@ -11,6 +11,7 @@ from turned import mirror, moved, turn
 
 from contactopt import (
     Contact,
+    InterfaceProblem,
     Material,
     Part,
     Pressure,
@@ -134,6 +135,18 @@ def cubic(cells: int, degree: int, shear: float = 0.0) -> Scene:
 def test_edges_in_space_under_constant_pressure_have_no_friction():
     solution = solve(reduce(cubic(4, 2)))  # 243 contacts exchange forces along three edges
     assert np.abs(solution.reactions[:, 1:]).max() < 1e-6 * solution.reactions[:, 0].max()
+
+
+@pytest.mark.parametrize("coupled", [0.0, 0.3], ids=["symmetric", "unsymmetric"])
+@pytest.mark.parametrize("felt, moved", [(0, 0), (1e-12, 0), (0, 1e-12), (1e-9, 0), (0, 1e-9)])
+def test_an_exchange_is_felt_alike_by_displacements_and_by_balance(felt, moved, coupled):
+    both, none = np.array([[0, 1, 0, 1], [0, 1, 0, -1]]) / np.sqrt(2)
+    Q = np.diag([1.0, 0, 1, 0]) + np.outer(both, both) + felt * np.outer(none, none)
+    Q[0, 2] = coupled
+    V = np.array([1.0, 0, 1, 0]) + moved * none
+    problem = InterfaceProblem(1e-5 * Q, np.zeros((2, 2)), mu=0.5, V=V[:, None], s=[-1.0])
+    unfelt = exchanged.exchanges(problem, np.arange(2))[1]
+    assert unfelt.shape[1] == (max(felt, moved) < 1e-10)
 
 
 @pytest.mark.parametrize(

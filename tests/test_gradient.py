@@ -28,12 +28,15 @@ CASES = {
             "von_mises:punch@0.1,0.2",
             "stress_xy:foundation@0.3,-0.4",
             "pressure@0.3,0",
+            "displacement:punch:contact:x",
+            "displacement:foundation:x+",
+            "reaction:foundation:bottom/x+:y",
         ),
     ),
     "axisymmetric": (
         lambda: scenes.make_scene("sphere", elements=6),
         ("E", "nu", "force:sphere:z"),
-        ("approach", "width", "von_mises:sphere"),
+        ("approach", "width", "von_mises:sphere", "displacement:foundation:contact:z"),
     ),
     "solid": (
         lambda: scenes.flat_punch(3, elements=3),

@@ -103,6 +103,12 @@ def test_a_file_may_ask_for_the_accuracy_of_a_load_path(tmp_path):
     assert result.summary["approach"] == pytest.approx(given.summary["approach"], rel=1e-9)
 
 
+def test_a_file_may_name_what_is_read(tmp_path):
+    text = SMALL.replace("tol", 'read = ["reaction:block:y+:y", "approach"]\ntol')
+    found = contactopt.run(written(tmp_path, text)).summary["quantities"]
+    assert found["reaction:block:y+:y"]["value"] == pytest.approx(-10.0) and len(found) == 2
+
+
 def test_every_entry_reaches_the_scene(tmp_path):
     plane = skfem.MeshTri2.init_circle(2)
     meshio.write(
@@ -227,7 +233,7 @@ MISTAKES = [
     ("thickness = 2.0", "thickness = ", 2, "invalid value"),
     ("thickness = 2.0", "units = { length = 3 }", 2, "'length' must be a text"),
     ("block = { x = [0, 2], y", "block = { x = [2, 0], y", 5, "'x' must ascend"),
-    ("block = { x = [0, 2], y", "block = { x = [2], y", 5, "two coordinates, .*got 1 values"),
+    ("block = { x = [0, 2], y", "block = { x = [2], y", 5, "two coordinates, .*got \\[2"),
     (
         "block = { x = [0, 2], y",
         "block = { z = [0, 2], y",
@@ -291,6 +297,8 @@ MISTAKES = [
     ("mu = 0.4", 'mu = 0.4\nlaw = "glue"', 19, "glue"),
     ("tol = 1e-10", "tol = 0", 21, "tol must be a finite number greater than 0"),
     ("tol = 1e-10", "accuracy = 0.1", 20, "belong together"),
+    ("tol = 1e-10", "read = [1]", 21, "'read' must be an array of names"),
+    ("tol = 1e-10", 'read = ["displacement:block:z+"]', 21, "no boundary 'z\\+'; it has x"),
     ("thickness = 2.0", "degree = 3", 2, "degree must be 1 or 2"),
     (
         'contact = "y-"',

@@ -110,6 +110,9 @@ def element_errors(
         try:
             seeds = quantity.slopes(state)
             found = duals_of(state, seeds).fields
+            if seeds.lifts:
+                lifts = zip(found, seeds.lifts)
+                found = tuple(W if own is None else W - own for W, own in lifts)
         except InputError as error:
             log.info("%s: no adjoint, %s", quantity.name, error)
     fields = displaced if found is None else found

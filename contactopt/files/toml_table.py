@@ -125,11 +125,18 @@ class Table:
         """
         values = self.take(key, list, needed=True, what=what)
         if count is not None and len(values) != count:
-            raise self.fail(f"{key!r} must be {what}; got {len(values)} values.", key)
+            raise self.fail(f"{key!r} must be {what}; got {short(values)}.", key)
         for i, value in enumerate(values):
             with self.about(key, i):
                 check_number(f"every value of {key}", value)
         return values
+
+    def names(self, key: str) -> tuple[str, ...]:
+        """Take an array of names, which must be there."""
+        values = self.take(key, list, needed=True, what="an array of names")
+        if not all(isinstance(value, str) for value in values):
+            raise self.fail(f"{key!r} must be an array of names; got {short(values)}.", key)
+        return tuple(values)
 
     def table(self, key: str) -> Any:
         """Take the table below an entry; None if there is no such entry."""

@@ -104,17 +104,24 @@ def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarr
     own = np.flatnonzero(free.ravel() & ~immovable(problem))
     if not len(own):
         return own, np.zeros((0, 0))
-    rows = own if problem.symmetric else slice(None)  # y'Q y = 0 if and only if Q y = 0
-    columns = Q[rows][:, own] if form(Q) == "array" else Q[rows][:, own].toarray()
+    columns = Q[:, own] if form(Q) == "array" else Q[:, own].toarray()
     motions = problem.V[own] / np.where(problem.reach > 0, problem.reach, 1.0)
     scaled = columns / (np.abs(columns).max() or 1.0)
-    if problem.symmetric:  # semidefinite, and so quicker
-        sizes, directions = np.linalg.eigh(scaled + motions @ motions.T)
-        return own, directions[:, np.abs(sizes) <= UNFELT]
     felt = np.vstack([scaled, motions.T])
-    sizes, directions = np.linalg.svd(felt, full_matrices=len(felt) < len(own))[1:]
-    small = np.pad(sizes, (0, len(own) - len(sizes))) <= UNFELT
-    return own, directions[small].T
+    if not problem.symmetric:
+        return own, _unfelt(felt)
+    # y'Q y <= UNFELT and |V'y|^2 <= UNFELT hold on a space that contains the y looked for and is
+    # found sooner, since the matrix is semidefinite
+    sizes, directions = np.linalg.eigh(scaled[own] + motions @ motions.T)
+    some = directions[:, sizes <= UNFELT]
+    return own, some @ _unfelt(felt @ some)
+
+
+def _unfelt(felt: np.ndarray) -> np.ndarray:
+    """An orthonormal basis of those directions that a matrix shortens to UNFELT or less."""
+    sizes, directions = np.linalg.svd(felt, full_matrices=len(felt) < felt.shape[1])[1:]
+    small = np.pad(sizes, (0, felt.shape[1] - len(sizes))) <= UNFELT
+    return directions[small].T
 
 
 def _closed(problem: InterfaceProblem, r: np.ndarray, at: np.ndarray) -> Iterator[np.ndarray]:

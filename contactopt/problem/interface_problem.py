@@ -144,7 +144,8 @@ class InterfaceProblem:
         }
         if motions and len(motions) != len(arrays["s"]):
             raise InputError(
-                f"motions must name the {len(arrays['s'])} columns of V; got {len(motions)} names."
+                f"motions must name the {count(len(arrays['s']), 'column')} of V; got"
+                f" {count(len(motions), 'name')}."
             )
         for name, value in values.items():
             object.__setattr__(self, name, value)

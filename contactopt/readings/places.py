@@ -19,6 +19,7 @@ slopes, the derivatives by what it was read from.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.readings.peaks import Peak, Reading, maxima
 from contactopt.readings.state import Functional, Seeds, State
+from contactopt.scenes.body_kinds import Support
 from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Part, Scene
 
@@ -104,9 +106,7 @@ def place_of(name: object, scene: Scene) -> Place | None:
     if kind != LARGEST and stress == kind:
         return None
     body, _, boundary = rest.partition(":")
-    if body not in scene.meshed:
-        wrong = f"there is no elastic body {body!r} with a mesh" if body else "it needs a body"
-        raise InputError(f"quantity {name!r}: {wrong}; choose from {', '.join(scene.meshed)}.")
+    check_meshed(name, body, scene)
     if kind != LARGEST and stress not in scene.analysis.stresses:
         names = ", ".join(f"stress_{own}" for own in scene.analysis.stresses)
         raise InputError(
@@ -121,29 +121,47 @@ def place_of(name: object, scene: Scene) -> Place | None:
     if boundary and at:
         raise InputError(f"quantity {name!r}: give either a boundary or a point.")
     if boundary or at:
-        _check_there(scene.meshed[body], region, scene)
+        check_there(name, scene.meshed[body], region, scene)
     return Place(name, kind if kind == LARGEST else stress, body, region)
 
 
-def _check_there(part: Part, region: Region, scene: Scene) -> None:
-    """InputError for a boundary that the body's first mesh lacks, and for a point far outside."""
+def check_meshed(name: str, body: str, scene: Scene) -> None:
+    """InputError unless the body of a quantity has a mesh."""
+    if body not in scene.meshed:
+        wrong = f"there is no elastic body {body!r} with a mesh" if body else "it needs a body"
+        raise InputError(f"quantity {name!r}: {wrong}; choose from {', '.join(scene.meshed)}.")
+
+
+def check_there(name: str, part: Part, region: Region, scene: Scene, meeting: bool = False) -> None:
+    """InputError for a boundary that the body's first mesh lacks, and for a point far outside. As
+    in Support, 'a/b' may be where the boundaries a and b meet, if that is allowed.
+    """
     from contactopt.meshes.cells import straight
 
     mesh = part.build_mesh(scene.elements, scene.zone)
     known = mesh.boundaries or {}
-    if region.boundary and region.boundary not in known:
-        raise InputError(
-            f"body '{part.name}' has no boundary {region.boundary!r}; it has"
-            f" {', '.join(sorted(known)) or 'none'}."
-        )
+    faces = Support(region.boundary).faces(known) if meeting else (region.boundary,)
+    for face in filter(None, faces if region.boundary else ()):
+        if face not in known:
+            raise InputError(
+                f"quantity {name!r}: body '{part.name}' has no boundary {face!r}; it has"
+                f" {', '.join(sorted(known)) or 'none'}."
+            )
+    if len(faces) > 1:
+        nodes = (mesh.facets[:, np.asarray(known[face])].ravel() for face in faces)
+        if not len(reduce(np.intersect1d, nodes)):
+            raise InputError(
+                f"quantity {name!r}: the boundaries of {region.boundary!r} share no node; name"
+                " boundaries that meet."
+            )
     if region.point:
         corners = straight(mesh).p
         low, high = corners.min(axis=1), corners.max(axis=1)
         slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)
         if np.any(region.point < low - slack) or np.any(region.point > high + slack):
             raise InputError(
-                f"the point ({_words(region)}) lies outside body '{part.name}'; give one inside it"
-                " or on its surface."
+                f"quantity {name!r}: the point ({_words(region)}) lies outside body"
+                f" '{part.name}'; give one inside it or on its surface."
             )
 
 

@@ -9,6 +9,8 @@ derivatives by forces, multipliers and displacements.
     pressure:CONTACT             at one contact, by its number [stress]
     pressure@X,Y                 at a place, and the stresses of contactopt.readings.places:
                                  von_mises:BODY:BOUNDARY, ...
+    displacement:BODY:BOUNDARY:COMPONENT, reaction:BODY:BOUNDARY:COMPONENT
+                                 at the nodes of a boundary, as contactopt.readings.node_sets says
     energy                       elastic energy of all bodies [force length]
     pressure, width              the largest pressure [stress] and the half-width of contact
                                  [length]; of one pair of several pressure:PAIR
@@ -33,6 +35,7 @@ from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.problem import Solution
 from contactopt.readings.edges import stick_reading, width_reading
+from contactopt.readings.node_sets import node_reading
 from contactopt.readings.peaks import Peak, Reading, pressure_reading
 from contactopt.readings.places import PLACED, place_of, place_seeds, read_place
 from contactopt.readings.plate_motions import approach, motion
@@ -97,7 +100,7 @@ def unit_of(name: str, units: tuple[str, str]) -> str:
     work = f"{force} {length}"
     known = {"approach": length, "shift": length, "width": length, "stick": ""}
     known |= {"normal_force": force, "shear_force": force, "resultant": force}
-    known |= {"energy": work, "friction_work": work}
+    known |= {"energy": work, "friction_work": work, "displacement": length, "reaction": force}
     return known.get(name.partition(":")[0], stress)
 
 
@@ -277,6 +280,10 @@ def _path_column(name: str, rest: str, scene: Scene) -> Quantity:
     return Quantity(name, slopes, column=name)
 
 
+def _at_nodes(name: str, rest: str, scene: Scene) -> Quantity:
+    return Quantity(name, *node_reading(name, rest, scene))
+
+
 def _energy(state: State) -> Seeds:
     reduction, by_r, by_U = state.reduction, np.zeros(state.problem.q.shape), []
     for number, body in enumerate(reduction.bodies):
@@ -311,5 +318,7 @@ ROWS: dict[str, tuple[str, Callable[[str, str, Scene], Quantity]]] = {
     "shear_force": ("[:PAIR]", _pair_force),
     "resultant": (":PAIR:COMPONENT", _pair_resultant),
     "friction_work": ("", _path_column),
+    "displacement": (":BODY:BOUNDARY[:COMPONENT]", _at_nodes),
+    "reaction": (":BODY:BOUNDARY:COMPONENT", _at_nodes),
 }
 NAMES = (*(f"{kind}{form}" for kind, (form, _) in ROWS.items()), *PLACED)

@@ -22,7 +22,8 @@ class Seeds:
 
     reactions (k, dim), multipliers (p,), displacements (k, dim) of u, slip (k, dim) of u measured
     from the state before, bodies: (n,) by U of each body at fixed forces and
-    multipliers;  explicit: by a scalar parameter at fixed forces, multipliers and displacements
+    multipliers;  lifts: (n,) displacement of the held unknowns of each body that the adjoint lacks;
+    explicit: by a scalar parameter at fixed forces, multipliers and displacements
     """
 
     value: float
@@ -31,6 +32,7 @@ class Seeds:
     displacements: np.ndarray | None = None
     slip: np.ndarray | None = None
     bodies: tuple[Any, ...] = ()
+    lifts: tuple[Any, ...] = ()
     explicit: Callable[[Parameter], float] = field(default=lambda which: 0.0)
 
 

@@ -101,10 +101,12 @@ def read_scenes(
         reading.state = state
         states.append(_scene(path, table(), reading)[0])
     where = top.lines.get(("contacts",), "")  # of those that are found
-    lines = {c.name: top.lines.get(("contacts", i), where) for i, c in enumerate(first.contacts)}
+    named = [(one, key) for key, own in solve.items() for one in (own if key == "read" else [own])]
+    lines = {one: top.lines.get(("solve", key), where) for one, key in named}
+    pairs = enumerate(first.contacts)
+    lines |= {pair.name: top.lines.get(("contacts", i), where) for i, pair in pairs}
     known = [own.name for own in first.bodies if ("bodies", own.name) in top.lines]
     lines |= {name: top.lines["bodies", name] for name in known}
-    lines |= {own: top.lines.get(("solve", key), where) for key, own in solve.items()}
     return tuple(states), solve, lines
 
 
@@ -273,8 +275,8 @@ def _solve(table: Table | None) -> dict[str, Any]:
     for key in IN_FILES:
         kind = OPTIONS[key].kind
         limits: dict[str, Any] = {"low": 0.0} if kind is float else {}
-        if table.has(key, kind):
-            found[key] = table.take(key, kind, **limits)
+        if table.has(key, list if kind is tuple else kind):
+            found[key] = table.names(key) if kind is tuple else table.take(key, kind, **limits)
     table.close()
     if ("accuracy" in found) != ("quantity" in found):  # the other options may stand alone here
         raise table.fail(TOGETHER)
