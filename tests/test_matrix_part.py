@@ -308,7 +308,7 @@ WRONG = {
     "f not finite": (lambda a: {"f": a["f"] + np.inf}, "loads f of body 'bed' holds"),
     "K of fewer points": (
         lambda a: {"K": a["K"][:-2, :-2], "f": a["f"][:-2], "fixed": [0, 1, 2]},
-        "K has 30 rows, but 16 points have 32 unknowns",
+        "K has 30 rows, but 32 unknowns belong to the points",
     ),
     "points of space": (
         lambda a: {"points": np.pad(a["points"], ((0, 0), (0, 1)))}, "need 2 coordinates each"

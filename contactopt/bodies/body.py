@@ -32,6 +32,7 @@ from contactopt.bodies.elements import (
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.bodies.thickness import thin_facets
+from contactopt.cards import count
 from contactopt.checks import check_size, place_words
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -180,7 +181,7 @@ def _words(mesh: Mesh) -> str:
     if not isinstance(mesh, skfem.Mesh):
         return type(mesh).__name__
     where = {1: "on a line", 2: "in a plane", 3: "in space"}[mesh.p.shape[0]]
-    return f"one of {mesh.nelements} elements {where}"
+    return f"one of {count(mesh.nelements, 'element')} {where}"
 
 
 def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:

@@ -30,6 +30,7 @@ from contactopt.bodies.matrix_checks import (
     without_stiffness,
 )
 from contactopt.bodies.solvers.ordering import elimination_work
+from contactopt.cards import count
 from contactopt.checks import place_words, real_array
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -166,9 +167,10 @@ def _matrices(part: MatrixPart, x: np.ndarray) -> tuple[sp.csr_matrix, np.ndarra
     if T is None:
         if K.shape[0] != n:
             raise InputError(
-                f"body '{part.name}': K has {K.shape[0]} rows, but {x.shape[1]} points have {n}"
-                " unknowns; where unknowns are left out or follow others, give constraints, the"
-                f" sparse matrix ({n}, {K.shape[0]}) that takes the unknowns of K to all of them."
+                f"body '{part.name}': K has {count(K.shape[0], 'row')}, but {n}"
+                " unknowns belong to the points; where unknowns are left out or follow others,"
+                f" give constraints, the sparse matrix ({n}, {K.shape[0]}) that takes the"
+                " unknowns of K to all of them."
             )
         return K, f, sp.identity(n, format="csr")
     m = T.shape[1]

@@ -14,6 +14,7 @@ from contactopt.bodies.assembly import Matrices
 from contactopt.bodies.elastic import ElasticBody
 from contactopt.bodies.motions import Motions, kernel, motion_labels, rigid_fields
 from contactopt.bodies.solvers.system import Act
+from contactopt.cards import count
 from contactopt.checks import real_array
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -142,8 +143,8 @@ def free_motions_of(
         Z = real_array(f"the motions of body '{part.name}'", part.motions)
         if Z.ndim != 2 or len(Z) != len(held) or not Z.any(axis=0).all():
             raise InputError(
-                f"body '{part.name}': its motions need {len(held)} rows, and none may be zero; got"
-                f" the shape {Z.shape}."
+                f"body '{part.name}': its motions need {count(len(held), 'row')}, and none"
+                f" may be zero; got the shape {Z.shape}."
             )
         words = tuple(f"motion {number}" for number in range(1, 1 + Z.shape[1]))
         error = np.abs(K @ Z).max(axis=0) / (abs(K) @ np.abs(Z)).max(axis=0)

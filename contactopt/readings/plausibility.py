@@ -106,9 +106,10 @@ def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
             shared = len(np.intersect1d(loaded, part.mesh.boundaries[name]))
             if shared:
                 notes.append(
-                    f"the {load.what} on {load.boundary!r} of body '{part.name}' acts on {shared}"
-                    f" facets of {name!r}, which may touch: it acts beside the contact forces, and"
-                    " where the surfaces are open; is another boundary meant?"
+                    f"the {load.what} on {load.boundary!r} of body '{part.name}' acts on"
+                    f" {count(shared, 'facet')} of {name!r}, which may touch: it acts beside"
+                    " the contact forces, and where the surfaces are open; is another"
+                    " boundary meant?"
                 )
     return notes
 

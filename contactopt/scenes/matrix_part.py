@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.cards import count
 from contactopt.checks import check_name, check_size, real_array, short
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -101,7 +102,11 @@ class MatrixPart:
             K = self._checked_stiffness(self._matrix("K", self.K))
         if f.shape != K.shape[:1]:
             raise self._wrong(
+<<<<<<< HEAD
                 f"f needs {K.shape[0]} numbers in one row, as K has rows; got the shape {f.shape}."
+=======
+                f"f needs {count(K.shape[0], 'number')}, as many as K has rows; got {f.size}."
+>>>>>>> main
             )
         points = real_array(f"the points of body '{self.name}'", self.points)
         if points.ndim != 2:
