@@ -102,11 +102,8 @@ class MatrixPart:
             K = self._checked_stiffness(self._matrix("K", self.K))
         if f.shape != K.shape[:1]:
             raise self._wrong(
-<<<<<<< HEAD
-                f"f needs {K.shape[0]} numbers in one row, as K has rows; got the shape {f.shape}."
-=======
-                f"f needs {count(K.shape[0], 'number')}, as many as K has rows; got {f.size}."
->>>>>>> main
+                f"f needs {count(K.shape[0], 'number')} in one row, as K has rows; got the shape"
+                f" {f.shape}."
             )
         points = real_array(f"the points of body '{self.name}'", self.points)
         if points.ndim != 2:
