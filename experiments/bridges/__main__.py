@@ -89,7 +89,7 @@ def pressed(block: Any) -> Scene:
 
 
 def answer(block: Any) -> tuple[np.ndarray, np.ndarray, float]:
-    """Forces (k, 3) in the order of their places, displacements (N, 3), and the CPU seconds of it."""
+    """Forces (k, 3) in the order of their places, displacements (N, 3), and CPU seconds."""
     start = time.process_time()
     reduction = reduce_bodies(pressed(block), solver="superlu")
     solution = solve(reduction.problem, tol=1e-13)
@@ -101,8 +101,8 @@ def answer(block: Any) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def linear(block: MatrixPart) -> tuple[float, float]:
-    """The CPU seconds of factors of K and of one solve, by the same solver in our order of elimination,
-    and by SciPy's spsolve in its own.
+    """The CPU seconds of factors of K and of one solve: by the same solver in our order, and by SciPy's
+    spsolve in its own.
     """
     held = cast(MatrixBody, assemble(pressed(block), block, 16, None)).body
     free, load = held.free, np.ones(len(held.load))
