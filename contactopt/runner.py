@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,12 +28,14 @@ from contactopt.outcome import Outcome
 from contactopt.problem import Solution
 from contactopt.readings.chords import chord_remarks
 from contactopt.readings.corners import corner_remarks
+from contactopt.readings.node_sets import bears
 from contactopt.readings.peaks import pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts, said_of_meshes
 from contactopt.readings.quantities import quantity_of_states
 from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
+from contactopt.readings.state import State
 from contactopt.readings.validity import impossible, validity
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
@@ -339,7 +342,8 @@ def _summary(
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    known = doubts(scene, reduction.couplings, reduction.planes, states)
+    force = partial(bears, State(reduction, solution))
+    known = doubts(scene, reduction.couplings, reduction.planes, states, force)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
         "scene": scene.name,
