@@ -171,6 +171,13 @@ def test_what_edges_exchange_or_what_is_not_looked_at_is_said_once(monkeypatch, 
         assert len(notes) == (shear > 0) and all(said in note for note in notes)
 
 
+def test_matrices_alone_tell_of_no_surfaces_that_meet():
+    """Stacks of rigid blocks have hundreds of places with several contacts, and no corner."""
+    problem = reduce(cubic(2, 1, 0.2))
+    assert problem.shared_places and not replace(problem, pairs=()).shared_places
+    assert not [note for note in solve(replace(problem, pairs=())).notes if "surfaces" in note]
+
+
 def slanted(rise: float, cells: tuple[int, int], kind: str, degree: int, law: str) -> Scene:
     """Two blocks under the pressure 1 all around; their seam climbs from a frictionless wall."""
     floor, parts = {"left": Support("left", {"x": 0.0}), "low": Support("low", {"y": 0.0})}, []
