@@ -232,8 +232,9 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
         together = list(dict.fromkeys(filter(None, labels)))
         if len(together) > 1:
             return (
-                f"the loads do not balance: nothing holds {' and '.join(together)} together"
-                f" ({motion}); hold one of them by a support, or give loads that balance."
+                "the loads do not balance: neither supports nor contacts hold"
+                f" {' and '.join(together)}, which move together ({motion}); hold one of them by a"
+                " support, or give loads that balance."
             )
         return (
             f"the loads do not balance: neither supports nor contacts hold {body} ({motion}); add a"
