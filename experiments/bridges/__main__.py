@@ -101,7 +101,7 @@ def answer(block: Any) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def linear(block: MatrixPart) -> tuple[float, float]:
-    """CPU seconds of factors and a solve: by the same solver in our order, by spsolve in its own."""
+    """CPU seconds of factors and a solve, by the same solver in our order and by spsolve."""
     held = cast(MatrixBody, assemble(pressed(block), block, 16, None)).body
     free, load = held.free, np.ones(len(held.load))
     start = time.process_time()
