@@ -228,7 +228,7 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
     body = body or "a body"
     if found.loose:
         far = np.abs(found.motion) > EQUAL * np.abs(found.motion).max()
-        labels = [_label(problem, i).rpartition(": ")[0] for i in np.flatnonzero(far)]
+        labels = [_label(problem, i).rpartition(": ")[0] for i in np.flatnonzero(far).tolist()]
         together = list(dict.fromkeys(filter(None, labels)))
         if len(together) > 1:
             return (
