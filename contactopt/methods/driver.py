@@ -103,8 +103,8 @@ def solve(
     limits = Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
         solution, swept = None, None
-        if chosen == USUAL and start is None and limits.usual:
-            solution, swept = solve_small(problem, tol)
+        if chosen == USUAL and limits.usual:
+            solution, swept = solve_small(problem, tol, start)
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
         solution = least_friction(problem, solution, tol)
