@@ -34,6 +34,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from contactopt.cards import count
 from contactopt.defaults import TOL
 from contactopt.derivatives.factors import UNSEEN, Whole
 from contactopt.derivatives.gradient import gradient
@@ -236,7 +237,7 @@ def quantity(
         array = jnp.asarray(values, float)
         if array.shape != (len(names),):
             raise InputError(
-                f"the function of {', '.join(names)} needs {len(names)} numbers, shape"
+                f"the function of {', '.join(names)} needs {count(len(names), 'number')}, shape"
                 f" ({len(names)},); got the shape {array.shape}."
             )
         return act(array)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
 from pathlib import Path
@@ -14,26 +14,20 @@ import numpy as np
 
 from contactopt.checks import meant, overheard, said_once
 from contactopt.coupling.back_to_bodies import recover
-from contactopt.coupling.reduction import Reduction
 from contactopt.errors import InputError
 from contactopt.figures.output import PAGE, draw, earlier_files, not_drawable, write
 from contactopt.figures.style import FORMATS
 from contactopt.files.writing import check_folder, finite, whole_folder
-from contactopt.linear.operators import has_entries
 from contactopt.methods import default_method, find_method
 from contactopt.methods.method import Method
 from contactopt.methods.notes import collected
 from contactopt.outcome import Outcome
-from contactopt.problem import Solution
 from contactopt.readings.chords import chord_remarks
 from contactopt.readings.corners import corner_remarks
-from contactopt.readings.peaks import pressure_reading
-from contactopt.readings.plate_motions import approach
-from contactopt.readings.plausibility import doubts, said_of_meshes
+from contactopt.readings.plausibility import said_of_meshes
 from contactopt.readings.quantities import quantity_of_states
-from contactopt.readings.resolution import remarks, smoothed
-from contactopt.readings.resultants import mirrors, tables
-from contactopt.readings.validity import impossible, validity
+from contactopt.readings.summary import summary_of
+from contactopt.readings.validity import impossible
 from contactopt.run_options import OPTIONS, RunOptions, choose, takes_options
 from contactopt.scenes import PATHS, make_path, make_scene
 from contactopt.scenes.scene import Scene
@@ -50,7 +44,6 @@ Note = Callable[[str], None]
 PATH_KEYS = (
     "approach", "shift", "shear_force", "contact_half_width", "stick_half_width", "friction_work",
 )  # fmt: skip
-WIDTHS = "contact_half_width", "stick_half_width"
 # option -> field of Limits
 BOUNDS = {"max_unknowns": "unknowns", "time_limit": "seconds", "max_memory": "memory"}
 
@@ -305,7 +298,7 @@ def _result(
         fields = recover(reduction, solution)
     with _clock(seconds, "readings"):
         states = [] if path is None else [state.scene for state in path.states]
-        summary = _summary(reduction, solution, names, states)
+        summary = summary_of(reduction, solution, names, states)
         summary |= {"status": ended.status.label, "message": ended.message}
         if estimate is None:  # which knows the curves, and refines the chords
             summary["remarks"] += chord_remarks(reduction, solution)
@@ -326,46 +319,6 @@ def _result(
         summary["accuracy"] = asdict(estimate)
     summary = finite(summary) | {"seconds": seconds}
     return Result(reduction.scene, reduction, ended, fields, solved.zones, summary, path, estimate)
-
-
-def _summary(
-    reduction: Reduction, solution: Solution, names: tuple[str, ...], states: Sequence[Scene] = ()
-) -> dict[str, Any]:
-    """What is known of the answer on one mesh at one state, of those of a load path."""
-    problem, scene = reduction.problem, reduction.scene
-    found = tables(reduction, solution)
-    single, first = len(problem.pairs) == 1, next(iter(found["pairs"].values()))
-    largest = max(pair["max_pressure"] for pair in found["pairs"].values())
-    peak = pressure_reading(reduction, solution) if single else None
-    more = [] if peak is None or not solution.solved else smoothed(peak, largest)
-    limits, beyond = validity(reduction, solution)
-    known = doubts(scene, reduction.couplings, reduction.planes, states)
-    said = [*known, *remarks(reduction, solution), *beyond]
-    return {
-        "scene": scene.name,
-        "kind": scene.kind,
-        "units": list(scene.units),
-        "thickness": None if scene.dim == 3 or scene.analysis.revolved else scene.thickness,
-        "mirrors": mirrors(reduction),
-        "dofs": reduction.dofs,
-        "contact_nodes": problem.contacts,
-        "mu": float(problem.mu.max(initial=0.0)),
-        **dict(zip(("method", "normal_backend", "tangential_backend"), names)),
-        "status": solution.status.label,
-        "message": solution.message,
-        "residual": float(solution.residual),
-        "outer_iterations": solution.iterations,
-        "normal_force": float(solution.reactions[:, 0].sum()),
-        "approach": approach(reduction, solution),
-        **{key: first[key] if single else None for key in WIDTHS},
-        "max_pressure": largest,
-        "pressure": None if peak is None else peak.value,
-        "q": "implicit" if not has_entries(problem.Q) else "explicit",
-        "products": solution.products,
-        "remarks": [*said, *more],
-        **found,
-        "limits": limits,
-    }
 
 
 def _written(

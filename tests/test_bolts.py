@@ -8,7 +8,7 @@ from skfem import MeshHex, MeshQuad, MeshTet
 
 import contactopt
 from contactopt import Bolt, InputError, Material, Part, Plate, Scene, Support, Traction
-from contactopt.holding import _rows
+from contactopt.holding.grown_load import load_rows
 from contactopt.readings.resultants import columns, pair_resultants
 from contactopt.scenes.parameters import parameter
 from contactopt.scenes.scene_files import read_scene_file
@@ -184,7 +184,7 @@ def test_a_bolted_joint_slides_at_mu_times_the_force_of_its_bolt():
         lambda part: replace(part, loads=(*part.loads, Traction("side", (0.01, 0.0))))
         if part.name == "up" else part
     )  # fmt: skip
-    assert set(_rows(pushed)) == {"up:side:x", "up:side:y", "bolt:m4"}
+    assert set(load_rows(pushed)) == {"up:side:x", "up:side:y", "bolt:m4"}
     assert contactopt.limit(pushed, "up:side:x").factor == pytest.approx(MU * F / 0.005, rel=1e-3)
 
 

@@ -149,6 +149,11 @@ def test_an_exchange_is_felt_alike_by_displacements_and_by_balance(felt, moved, 
     assert unfelt.shape[1] == (max(felt, moved) < 1e-10)
 
 
+def test_a_seat_whose_forces_have_the_least_friction_is_not_said_to_be_far_off():
+    """Its 27 contacts exchange forces, so that rounding makes the condition of the solution."""
+    assert not solve(reduce(cubic(2, 1))).notes
+
+
 @pytest.mark.parametrize(
     ("bound", "said"),
     [
@@ -164,6 +169,13 @@ def test_what_edges_exchange_or_what_is_not_looked_at_is_said_once(monkeypatch, 
             note for note in solve(reduce(cubic(2, 1, shear))).notes if "surfaces meet" in note
         ]
         assert len(notes) == (shear > 0) and all(said in note for note in notes)
+
+
+def test_matrices_alone_tell_of_no_surfaces_that_meet():
+    """Stacks of rigid blocks have hundreds of places with several contacts, and no corner."""
+    problem = reduce(cubic(2, 1, 0.2))
+    assert problem.shared_places and not replace(problem, pairs=()).shared_places
+    assert not [note for note in solve(replace(problem, pairs=())).notes if "surfaces" in note]
 
 
 def slanted(rise: float, cells: tuple[int, int], kind: str, degree: int, law: str) -> Scene:

@@ -3,6 +3,7 @@ what a run solves just below and above it.
 """
 
 import math
+import re
 from dataclasses import replace
 from functools import partial
 
@@ -329,3 +330,15 @@ def test_an_open_corner_that_closes_after_a_turn_is_not_counted():
     f = (mu * weight * head[1] - weight * middle[0]) / (width * (head[1] - foot[1]))
     assert found.factor == pytest.approx(f, rel=1e-4)
     assert "after a motion that is not small" in found.sentence
+
+
+def test_the_progress_has_no_rounding_for_zero_and_counts_in_the_singular():
+    notes = []
+    for scene in (pressed(), slope(support=(Support("left", {"x": 0.0}),))):
+        limit_of(
+            (scene,),
+            f"{scene.upper.name}:{scene.upper.loads[0].boundary or 'body_force'}",
+            notes.append,
+        )
+    assert "push 1: 0 times the load" in notes
+    assert not [text for text in notes if re.search(r"\de-1\d|\b1 \w+s\b", text)], notes

@@ -246,7 +246,7 @@ def test_repairs_are_logged(tmp_path, caplog):
     assert flux(mesh) == pytest.approx(4)
     for what in (
         "nodes that lie on others",
-        "1 elements are there twice",
+        "1 element is there twice",
         "quad number 2 of the file",
         "3 nodes of the file",
     ):
@@ -948,10 +948,14 @@ def test_results_are_passed_over_and_free_formats_are_free(tmp_path, name, text,
         ("a.msh", MSH2.replace("7 7 1 3 4", "7 7 1 3 9"), "an element names a node that is not"),
         ("a.msh", MSH2.replace("3 1 1 0", "3 1 x 0"), "a number or a word is not where"),
         ("a.mesh", MEDIT.replace("Dimension 2\n", ""), "must stand before Vertices"),
-        ("a.mesh", MEDIT.replace("1 3 4 7", "1 3 4"), "Triangles are 2 rows of 4 numbers, not 7"),
+        (
+            "a.mesh",
+            MEDIT.replace("1 3 4 7", "1 3 4"),
+            "Triangles: 2 times 4 numbers are announced, and 7",
+        ),
         ("a.su2", SU2.replace("5 0 1 2 0", "22 0 1 2 4 5 6 0"), r"line 4: elements of type 22"),
         ("a.su2", SU2 + "NDIME= 2\n", r"line 22: it has several zones"),
-        ("a.su2", SU2[:-6], "ends before the 1 rows of MARKER_ELEMS"),
+        ("a.su2", SU2[:-6], "ends before row 1 of MARKER_ELEMS"),
         (
             "a.mesh",
             "MeshVersionFormatted 2\nDimension 3\nTetrahedraP2\n",

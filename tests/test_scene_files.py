@@ -233,7 +233,7 @@ MISTAKES = [
     ("thickness = 2.0", "thickness = ", 2, "invalid value"),
     ("thickness = 2.0", "units = { length = 3 }", 2, "'length' must be a text"),
     ("block = { x = [0, 2], y", "block = { x = [2, 0], y", 5, "'x' must ascend"),
-    ("block = { x = [0, 2], y", "block = { x = [2], y", 5, "two coordinates, .*got 1 values"),
+    ("block = { x = [0, 2], y", "block = { x = [2], y", 5, "two coordinates, .*got \\[2"),
     (
         "block = { x = [0, 2], y",
         "block = { z = [0, 2], y",

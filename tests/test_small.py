@@ -1,5 +1,7 @@
 """Small problems by compiled sweeps, against the same formulas in Python."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -127,3 +129,23 @@ def test_sweeps_that_fail_are_not_made_again(monkeypatch):
     monkeypatch.setattr(gauss_seidel.Sweeps, "__call__", counted)
     solve(problem, max_iterations=60)
     assert sum(counts) <= 1000
+
+
+@pytest.mark.parametrize("cold", [1.0, 1e-3, 0.0])
+def test_from_a_given_start_the_same_call_is_made_and_no_start_is_taken_that_does_not_fit(cold):
+    """An answer of the problem under 5 % more load: the call ends in fewer sweeps or as many."""
+    for seed in (s for s in range(40) if s % 5):
+        problem = any_problem(seed)
+        more = problem.altered(q=1.05 * problem.q)
+        if (first := solve_small(problem, 1e-8)[0]) is None:
+            continue
+        start = replace(first, reactions=cold * first.reactions)
+        warm, _ = solve_small(more, 1e-8, start)
+        if warm is None:
+            continue
+        assert natural_map_residual(more, warm.reactions, np.zeros(0)) <= 1.1e-8, seed
+        assert np.array_equal(start.reactions, cold * first.reactions)
+        again = solve(more, start=start)
+        assert np.array_equal(again.reactions, warm.reactions), seed
+    with pytest.raises(InputError, match="start has reactions"):
+        solve(any_problem(3), start=replace(first, reactions=np.zeros((99, 2))))

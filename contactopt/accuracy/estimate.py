@@ -43,8 +43,9 @@ class Level:
     def mesh(self) -> str:
         """What the mesh is, in words."""
         error = "unknown" if self.error is None else f"{self.error:.1e}"
-        made = f"{self.elements} elements, {self.splits} splits, " if self.elements else ""
-        return f"{made}{self.contacts} contacts, estimated error {error}"
+        things = {"element": self.elements, "split": self.splits, "contact": self.contacts}
+        made = ", ".join(count(number, thing) for thing, number in things.items() if number)
+        return f"{made}, estimated error {error}"
 
 
 @dataclass(frozen=True, repr=False)

@@ -37,6 +37,7 @@ import numpy as np
 
 from contactopt.accuracy.estimate import Judged
 from contactopt.accuracy.indicators import EDGES
+from contactopt.cards import count
 from contactopt.meshes.cells import is_curved
 from contactopt.readings.constants import BELOW, FIRST, MOST_UNKNOWNS, SLOWEST, STUCK
 from contactopt.readings.peaks import Peak, Reading
@@ -143,7 +144,8 @@ class Everywhere:
         """Solve the next mesh."""
         elements, splits = self.jobs[0]
         self.options.note(
-            f"{elements} elements across the half-width" + (f", {splits} splits" if splits else "")
+            f"{count(elements, 'element')} across the half-width"
+            + (f", {count(splits, 'split')}" if splits else "")
         )
         states = [split_scene(scene, elements // 2**splits, splits) for scene in self.states]
         return solve_states(states, elements, self.options, self.last)

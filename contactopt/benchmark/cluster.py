@@ -10,6 +10,7 @@ from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import History, Worker
 from contactopt.benchmark.runs import Run
 from contactopt.benchmark.store import require
+from contactopt.cards import count
 from contactopt.errors import InputError
 
 CONNECT_LIMIT = 30.0  # s for a scheduler to answer
@@ -23,7 +24,9 @@ def shard_of(runs: Sequence[Run], shard: str) -> list[Run]:
         raise InputError(f"the shard '{shard}' must be i/n with whole numbers, i from 1 to n.")
     names = list(dict.fromkeys(run.problem.label for run in runs))
     if i > len(names):
-        raise InputError(f"shard {shard} is empty, since there are {len(names)} problems only.")
+        raise InputError(
+            f"shard {shard} is empty: the run has only {count(len(names), 'problem')}."
+        )
     return [run for run in runs if run.problem.label in {*names[i - 1 :: n]}]
 
 

@@ -23,6 +23,7 @@ from contactopt.benchmark.process import one_line
 from contactopt.benchmark.runs import Run
 from contactopt.benchmark.sequences import Sequence, certificate
 from contactopt.benchmark.store import ABSENT, SCHEMA, UNKNOWN, pack
+from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Status
 
@@ -104,7 +105,7 @@ def _machine() -> str:
             names = [line.split(":")[1].strip() for line in file if line.startswith("model name")]
         model = names[0] if names else model
     memory = psutil.virtual_memory().total / 1e9
-    return f"{model}, {os.cpu_count()} cores, {memory:.0f} GB, {platform.system()}"
+    return f"{model}, {count(os.cpu_count() or 1, 'core')}, {memory:.0f} GB, {platform.system()}"
 
 
 @cache

@@ -20,6 +20,7 @@ from contactopt.benchmark.process import Ended, Process, one_line
 from contactopt.benchmark.sequences import Sequence as States
 from contactopt.benchmark.sequences import certificate
 from contactopt.benchmark.store import ABSENT, answers, load
+from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.files.toml_table import read_table
 from contactopt.problem import InterfaceProblem
@@ -95,8 +96,8 @@ def _recomputed(
         " taken over as they stand there."
     ]
     said += [
-        f"'{path}': {number} rows are left out, since their certificate cannot be recomputed:"
-        f" {reason}."
+        f"'{path}': {count(number, 'row is', 'rows are')} left out, since no certificate can be"
+        f" recomputed: {reason}."
         for reason, number in Counter(filter(None, why.values())).most_common()
     ]
     left_out = [index for index, reason in why.items() if reason]

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactopt.cards import count
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -56,7 +58,8 @@ def factors(table: pd.DataFrame) -> dict[str, tuple[float, str]]:
         speeds = [_calibration(of[one]) for one in (name, first)]
         if len(logs):
             by = np.exp(logs.groupby("name").mean())
-            words = f"{len(logs)} runs made on both ({by.min():.2f} to {by.max():.2f} by method)"
+            words = f"{count(len(logs), 'run')} made on both"
+            words += f" ({by.min():.2f} to {by.max():.2f} by method)"
             made[name] = float(np.exp(logs.mean())), words
         elif set(of[name]["method"]) == set(of[first]["method"]):
             made[name] = speeds[0] / speeds[1], "the calibrations, since no run was made on both"

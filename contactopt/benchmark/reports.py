@@ -22,6 +22,7 @@ from contactopt.benchmark.ranking import BUSY, machines_said, wall_over_cpu
 from contactopt.benchmark.report_figures import FIGURES
 from contactopt.benchmark.store import load, require, save
 from contactopt.benchmark.tables import TABLES, select
+from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.figures.style import save_figure
 from contactopt.files.writing import remove_files, whole_folder
@@ -177,8 +178,8 @@ def _foot(layout: Experiment, folder: Path, table: pd.DataFrame) -> str:
         )
     machines, versions = ("; ".join(sorted(set(table[key]))) for key in ("machine", "versions"))
     lines = [
-        f"{len(table)} runs, of which {failures} did not keep their tolerance. Every success is a"
-        " certificate recomputed from the problem.",
+        f"{count(len(table), 'run')}, of which {failures} did not keep their tolerance. Every"
+        " success is a certificate recomputed from the problem.",
         f"Wall time over CPU time of the calls is {busy:.2f}, a median over the methods. More than"
         f" 1 means a busy machine, and above {BUSY:g} nothing is ranked. CPU times are compared,"
         " and time limits are wall times.",

@@ -27,6 +27,7 @@ from contactopt.benchmark.process import one_line
 from contactopt.benchmark.sequences import Sequence as States
 from contactopt.benchmark.sequences import states_of
 from contactopt.benchmark.store import STATUSES
+from contactopt.cards import count
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.operators import form, has_entries
 from contactopt.methods import find_method
@@ -184,7 +185,9 @@ def _along(call: Call, problem: InterfaceProblem | States, limit: float) -> Answ
     left = limit
     for number, state in enumerate(problem.states, 1):
         if left <= 0:
-            return Answer("time_limit", f"{number - 1} of {len(problem.states)} states in time")
+            return Answer(
+                "time_limit", f"{number - 1} of {count(len(problem.states), 'state')} in time"
+            )
         begin = CLOCKS[0]()
         answer = call(state, problem.warm and number > 1, left)
         # the bridge to an external solver is not counted

@@ -32,6 +32,7 @@ from contactopt.bodies.elements import (
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
 from contactopt.bodies.thickness import thin_facets
+from contactopt.cards import count
 from contactopt.checks import check_size, place_words
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -108,7 +109,7 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     if not held or not np.array_equal(fixed.motion, body.motion):
         raise InputError(
             f"body '{part.name}': supports or plates hold other unknowns than before; reduce it"
-            " anew."
+            " again."
         )
     return replace(
         body,
@@ -147,14 +148,14 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
         place = place_words(middle)
         raise InputError(
             f"body '{part.name}': tetrahedra split a quadrilateral along different diagonals, at"
-            f" ({place}), and share no side there; mesh this place anew."
+            f" ({place}), and share no side there; mesh this place again."
         )
     _check_pieces(part, mesh)
     if (over := overlapping(mesh)) is not None:
         place = place_words(mesh.p[:, mesh.t[:, over]].mean(axis=1))
         raise InputError(
             f"body '{part.name}': an element of the mesh lies over its neighbour, at ({place});"
-            " move its nodes apart, or mesh this place anew."
+            " move its nodes apart, or mesh this place again."
         )
     if scene.analysis.revolved and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
         raise InputError(
@@ -180,7 +181,7 @@ def _words(mesh: Mesh) -> str:
     if not isinstance(mesh, skfem.Mesh):
         return type(mesh).__name__
     where = {1: "on a line", 2: "in a plane", 3: "in space"}[mesh.p.shape[0]]
-    return f"one of {mesh.nelements} elements {where}"
+    return f"one of {count(mesh.nelements, 'element')} {where}"
 
 
 def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:

@@ -30,6 +30,7 @@ from contactopt.bodies.matrix_checks import (
     without_stiffness,
 )
 from contactopt.bodies.solvers.ordering import elimination_work
+from contactopt.cards import count
 from contactopt.checks import place_words, real_array
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -166,9 +167,10 @@ def _matrices(part: MatrixPart, x: np.ndarray) -> tuple[sp.csr_matrix, np.ndarra
     if T is None:
         if K.shape[0] != n:
             raise InputError(
-                f"body '{part.name}': K has {K.shape[0]} rows, but {x.shape[1]} points have {n}"
-                " unknowns; where unknowns are left out or follow others, give constraints, the"
-                f" sparse matrix ({n}, {K.shape[0]}) that takes the unknowns of K to all of them."
+                f"body '{part.name}': K has {count(K.shape[0], 'row')}, but {n}"
+                " unknowns belong to the points; where unknowns are left out or follow others,"
+                f" give constraints, the sparse matrix ({n}, {K.shape[0]}) that takes the"
+                " unknowns of K to all of them."
             )
         return K, f, sp.identity(n, format="csr")
     m = T.shape[1]
@@ -202,6 +204,11 @@ def _held(
     made = Constraints(scene, part, numbers, part.facets, _nodes_of(part), *none)
     follows, fixed = _follows(D), {} if part.fixed is None else part.fixed
     if not isinstance(fixed, Mapping):
+        if np.asarray(fixed).dtype == bool:
+            raise InputError(
+                f"body '{part.name}': fixed names unknowns by their numbers; of a mask give"
+                " numpy.flatnonzero(mask)."
+            )
         fixed = dict.fromkeys(np.ravel(fixed).tolist(), 0.0)
     where = real_array(f"the fixed unknowns of body '{part.name}'", list(fixed))
     values = real_array(f"the fixed displacements of body '{part.name}'", list(fixed.values()))
@@ -304,7 +311,7 @@ def _surface(
     tied = bool(laws) and not any(law.bounded for law in laws)
     weight = (scene.analysis.measure(scene.thickness) * scene.copies, scene.analysis.revolved)
     try:
-        made = bare_surface(at.x, facets, outward, weight, tied)
+        made = bare_surface(at.x, facets, outward, weight, tied, coupled)
     except InputError as error:
         raise InputError(f"{what}: {error}") from None
     trace, point = made.trace, made.nodes

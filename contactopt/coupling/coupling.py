@@ -23,6 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies.assembled import AssembledBody
+from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.coupling.patch_test import misfit
 from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
@@ -132,10 +133,10 @@ def couple(
             why = f"the nodes match, but {made.fails.partition(': ')[2].partition(';')[0]}"
     if made.kind != ways[0]:
         log.info("contact '%s' is coupled by %s: %s", pair.name, made.kind, why)
-    if made.share is not None and (ends := np.count_nonzero(made.share < COVERED)):
+    if made.share is not None and (ends := int(np.sum(made.share < COVERED))):
         why += (
-            f"; the other surface ends within the faces of {ends} contacts, whose pressure is the"
-            " force over the part that it covers"
+            f"; the other surface ends within the faces of {count(ends, 'contact')}, whose"
+            " pressure is the force over the part that it covers"
         )
     return replace(made, why=why)
 

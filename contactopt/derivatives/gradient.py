@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from contactopt.cards import count
 from contactopt.derivatives.kinks import Weak, of_kinks
 from contactopt.derivatives.states import Chain, along, chain_of
 from contactopt.errors import InputError
@@ -95,7 +96,9 @@ def gradient(
     """
     chain = chain_of(result, distance)
     if not -len(chain.steps) <= state < len(chain.steps):
-        raise InputError(f"the path has {len(chain.steps)} states; there is no state {state}.")
+        raise InputError(
+            f"the path has {count(len(chain.steps), 'state')}; there is no state {state}."
+        )
     state %= len(chain.steps)
     chain = Chain(chain.steps[: state + 1])
     which = parameters_of(parameters, chain.steps[0].reduction.scene)

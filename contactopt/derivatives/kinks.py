@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
+from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.problem.laws.law import Kinks, Law
 
@@ -59,8 +60,9 @@ def of_kinks(what: str, names: list[str], near: str = "") -> str:
         return f"the {what} has a gradient here: no contact is weakly active"
     more = f" and {len(names) - 5} more" if len(names) > 5 else ""
     return (
-        f"the {what} has no gradient here, only one-sided derivatives: {len(names)} contacts are"
-        f" weakly active{near}: {', '.join(names[:5])}{more}"
+        f"the {what} has no gradient here, only one-sided derivatives:"
+        f" {count(len(names), 'contact is', 'contacts are')} weakly active{near}:"
+        f" {', '.join(names[:5])}{more}"
     )
 
 

@@ -66,7 +66,7 @@ def _item(group: h5py.Group, name: str) -> Any:
         if group.external or group.is_virtual:
             raise InputError(f"the data of '{name}' lie in another file, which is not read")
         if group.nbytes > SMALL + PACKED * group.id.get_storage_size():
-            raise InputError(f"'{name}' announces {group.size} numbers, which are not in the file")
+            raise InputError(f"'{name}' announces more numbers, {group.size}, than are in the file")
     return group
 
 

@@ -58,7 +58,7 @@ def read_text(path: Path) -> InterfaceProblem:
     if contacts < 0 or rows != dim * contacts or columns != rows:
         raise InputError(
             f"its matrix is {rows} by {columns}, which does"
-            f" not fit {contacts} contacts in {dim} dimensions"
+            f" not fit contacts, {contacts} of them, in {dim} dimensions"
         )
     rest = head[5] if len(head) > 5 else ""
     if storage == SPARSE:

@@ -11,6 +11,7 @@ import numpy as np
 from skfem import Mesh
 
 from contactopt.bodies.elements import Faces
+from contactopt.cards import count
 from contactopt.defaults import EQUAL
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
@@ -30,7 +31,8 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
     for (name, mesh), group in zip(named.items(), meshes):
         low, high = _place(mesh, mesh.p.min(axis=1)), _place(mesh, mesh.p.max(axis=1))
         lines.append(
-            f"\n[bodies.{name}]  # {mesh.nelements} elements, {inside} {_measure(mesh)[0]:.5g}"
+            f"\n[bodies.{name}]  # {count(mesh.nelements, 'element')},"
+            f" {inside} {_measure(mesh)[0]:.5g}"
         )
         lines += [f"# from {low} to {high}", f'mesh = "{path}"']
         lines += [] if group is None else [f'group = "{group}"']

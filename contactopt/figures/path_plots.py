@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contactopt.cards import force_unit
+from contactopt.cards import count, force_unit
 from contactopt.figures.style import (
     BLUE,
     GREEN,
@@ -57,7 +57,7 @@ def path_figure(path: PathResult) -> Any:
     loop(path, above)
     energies(path, below)
     scene = path.states[-1].scene
-    title = f"{scene.name}, {symbols(scene.friction)}, {len(path.states)} states"
+    title = f"{scene.name}, {symbols(scene.friction)}, {count(len(path.states), 'state')}"
     figure.suptitle(title, fontsize=LETTERS)
     return figure
 

@@ -125,7 +125,7 @@ class Table:
         """
         values = self.take(key, list, needed=True, what=what)
         if count is not None and len(values) != count:
-            raise self.fail(f"{key!r} must be {what}; got {len(values)} values.", key)
+            raise self.fail(f"{key!r} must be {what}; got {short(values)}.", key)
         for i, value in enumerate(values):
             with self.about(key, i):
                 check_number(f"every value of {key}", value)

@@ -185,7 +185,8 @@ def _reflected(block: Block, kind: str, x: np.ndarray) -> np.ndarray:
     values = [block.real(line, word) for line, words in block.rows for word in words]
     count = {"MIRROR": 3, "LINE": 2, "POINT": 1}.get(kind, 0)
     if not count or len(values) != 3 * count:
-        raise block.fail(f"REFLECT={kind} needs the coordinates of {count or 'known'} points")
+        known = "MIRROR (three points), LINE (two) or POINT (one)"
+        raise block.fail(f"REFLECT={kind} must be {known}, with the coordinates of the points")
     a, *others = np.reshape(values, (count, 3))
     if kind == "POINT":
         return np.asarray(2 * a - x)

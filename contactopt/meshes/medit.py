@@ -70,5 +70,7 @@ def _table(name: str, body: list[str], width: int) -> np.ndarray:
     numbers = np.array(body, dtype=float)
     count = int(numbers[0]) if len(numbers) else 0
     if len(numbers) != 1 + count * width:
-        raise Damaged(f"{name} are {count} rows of {width} numbers, not {len(numbers) - 1} in all")
+        raise Damaged(
+            f"{name}: {count} times {width} numbers are announced, and {len(numbers) - 1} are there"
+        )
     return numbers[1:].reshape(count, width)

@@ -238,7 +238,7 @@ def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
         raise cells.refused(
             int(np.argmax(np.any(cells.nodes == both[0], axis=0))),
             "a node of {} is a corner of one element and"
-            " within an edge of another; mesh this place anew.",
+            " within an edge of another; mesh this place again.",
         )
     kept = np.concatenate([corners, inner])
     number = np.full(cells.points.shape[1], -1)
@@ -251,7 +251,7 @@ def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
     except (IndexError, ValueError) as error:  # there are not as many nodes as edges
         raise InputError(
             f"mesh file '{cells.path}': neighbouring elements do not share the nodes within their"
-            " edges; mesh it anew."
+            " edges; mesh it again."
         ) from error
     return mesh, number
 
@@ -268,14 +268,14 @@ def _boundaries(
         hits, others = [], list[tuple[int, ...]]()
         for i, elements in groups.members[name, dim - 1].items():
             kind, nodes, _ = groups.blocks[i]
-            count = 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])
-            facets = np.sort(number[nodes[elements][:, :count]], axis=1)
+            many = 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])
+            facets = np.sort(number[nodes[elements][:, :many]], axis=1)
             keys = [key for key in map(tuple, facets.tolist()) if key[0] >= 0]
             hits += [place[key] for key in keys if key in place]
             others += [key for key in keys if key not in place]
         if others and (inside := len(_inner(mesh).intersection(others))):
-            said = "%d facets of %s lie inside the body: no boundary of it holds them"
-            log.warning(said, inside, name)
+            said = "no boundary of the body holds %s of %s, inside the body"
+            log.warning(said, count(inside, "facet"), name)
         if hits:
             found[name] = outer[np.unique(hits)]
     skin = np.isin(np.arange(mesh.nvertices), corners)

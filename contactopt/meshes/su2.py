@@ -45,7 +45,7 @@ def read_su2(path: Path) -> Any:
                 continue
             block = [lines.pop() for _ in range(min(count, len(lines)))]
             if len(block) < count:
-                raise Damaged(f"it ends before the {count} rows of {key}")
+                raise Damaged(f"it ends before row {count} of {key}")
             if key == "NPOIN":
                 points = np.array([row.split()[:dim] for _, row in block], dtype=float)
                 continue

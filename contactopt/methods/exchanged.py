@@ -40,11 +40,15 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
     if not solution.solved or not places:
         return solution
     known, left, corners = has_entries(problem.Q), [], np.concatenate(places)
+    alone = known  # whether each place is looked at by itself
     if known and problem.contacts <= FEW:
         everything = np.arange(problem.contacts)
-        solution, some = _exchanged(problem, solution, tol, everything, corners)
-        left += [_most_friction(solution, corners)] * some
-    for at in places if known else ():
+        made, some = _exchanged(problem, solution, tol, everything, corners)
+        if some:
+            rubbed = [at[0] for at in places if _rubs(made.reactions[at])]
+            left = [_most_friction(made, corners), *rubbed]
+        alone, solution = some and made is solution, made
+    for at in places if alone else ():
         far = np.linalg.norm(points - points[at[0]], axis=1)
         near = np.argsort(far, kind="stable")[:NEAREST]
         solution, some = _exchanged(problem, solution, tol, near, at)
@@ -79,8 +83,8 @@ def _exchanged(
     left = False
     for contacts in _closed(problem, solution.reactions, near):
         own, unfelt = exchanges(problem, contacts)
-        if not unfelt.size:
-            continue
+        if not unfelt.size:  # nor do fewer of them exchange any
+            return solution, left
         r, unique = _with_least(solution.reactions, own, unfelt)
         residual = natural_map_residual(problem, r, solution.multipliers)
         if residual <= max(solution.residual, tol):

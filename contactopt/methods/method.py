@@ -39,9 +39,12 @@ def at_rest(problem: InterfaceProblem) -> Iterate:
 
 
 def dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scales) -> Iterate:
-    """Take a solution to start from to a problem's dimensionless form; InputError if it does not
-    fit.
-    """
+    """Take a solution to start from to a problem's dimensionless form."""
+    return scales.to_dimensionless(*checked_start(start, problem))
+
+
+def checked_start(start: object, problem: InterfaceProblem) -> Iterate:
+    """Forces and multipliers of a solution to start from; InputError if it does not fit."""
     if not isinstance(start, Solution):
         raise InputError(f"start must be a Solution; got {type(start).__name__}.")
     r = real_array("the start's array of reactions", start.reactions)
@@ -51,4 +54,4 @@ def dimensionless_start(start: Solution, problem: InterfaceProblem, scales: Scal
             f"start has reactions {r.shape} and multipliers {multipliers.shape}; this problem needs"
             f" {problem.q.shape} and {problem.s.shape}."
         )
-    return scales.to_dimensionless(r, multipliers)
+    return r, multipliers

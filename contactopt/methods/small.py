@@ -14,6 +14,7 @@ from contactopt.linear.operators import form
 from contactopt.methods import constants
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels import gauss_seidel
+from contactopt.methods.method import checked_start
 from contactopt.methods.notes import FEW
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.laws.coulomb import Coulomb
@@ -21,7 +22,9 @@ from contactopt.problem.laws.coulomb import Coulomb
 NAME = repr(Auto())
 
 
-def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None, np.ndarray | None]:
+def solve_small(
+    problem: InterfaceProblem, tol: float, start: Solution | None = None
+) -> tuple[Solution | None, np.ndarray | None]:
     """The certified solution; or None, and where the sweeps ended, None if they were not made."""
     begin = time.perf_counter()
     if (given := arrays_of(problem)) is None:
@@ -31,7 +34,8 @@ def solve_small(problem: InterfaceProblem, tol: float) -> tuple[Solution | None,
         return None, None
     # all digits cost less than the condition of few contacts (contactopt.methods.notes)
     look = np.inf if problem.contacts <= FEW else constants.LOOK / cost
-    residual, r = certified(given, constants.FIRST_SWEEPS, look, tol)
+    first = None if start is None else checked_start(start, problem)[0]
+    residual, r = certified(given, constants.FIRST_SWEEPS, look, tol, first)
     if not residual <= tol:
         return None, r
     seconds = time.perf_counter() - begin
@@ -69,7 +73,7 @@ def certified(
     not converge, and their forces. `look` is how many of them are worth a certificate of their own.
     """
     dim, arrays = given
-    r = np.zeros(arrays[-1].shape) if r is None else r.copy()
+    r = np.zeros(arrays[-1].shape) if r is None else np.array(r, float, order="C")
     numbers = constants.NEARLY_SWEPT, constants.SWEPT, look, tol
     kept = constants.SWEEPS_KEPT, constants.FIRST_BETWEEN
     compiled = gauss_seidel.compiled("certified")

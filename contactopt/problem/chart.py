@@ -99,11 +99,14 @@ class Chart:
         return spacing
 
 
+UNNAMED = "contact"
+
+
 @dataclass(frozen=True, eq=False)
 class Pair:
     """Consecutive contacts of an interface problem that belong to one pair of surfaces.
 
-    name          of the pair, for messages, tables and files
+    name          of the pair, for messages, tables and files; UNNAMED where none is given
     start, stop   numbers of its first contact and of the first one after it
     chart         places of its contacts on their surface
     """

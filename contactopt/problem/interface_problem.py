@@ -38,7 +38,7 @@ from contactopt.linear.operators import (
     row_sizes,
     sparse,
 )
-from contactopt.problem.chart import Chart, Pair
+from contactopt.problem.chart import UNNAMED, Chart, Pair
 from contactopt.problem.cones import lengths
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.law import Law
@@ -144,7 +144,8 @@ class InterfaceProblem:
         }
         if motions and len(motions) != len(arrays["s"]):
             raise InputError(
-                f"motions must name the {len(arrays['s'])} columns of V; got {len(motions)} names."
+                f"motions must name the {count(len(arrays['s']), 'column')} of V; got"
+                f" {count(len(motions), 'name')}."
             )
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -229,9 +230,11 @@ class InterfaceProblem:
 
     @cached_property
     def shared_places(self) -> list[np.ndarray]:
-        """The contacts at every place that has several."""
+        """The contacts at every place that has several, where the pairs of surfaces have names:
+        matrices alone tell of no surface that meets another.
+        """
         x = self.coordinates
-        if x.shape[1] != self.contacts or self.contacts < 2:
+        if x.shape[1] != self.contacts or self.contacts < 2 or self.pairs[0].name == UNNAMED:
             return []
         near = TOGETHER * (x.max(axis=1) - x.min(axis=1)).max()
         line = GENERIC[: len(x)] @ x  # no two points of a grid fall together
@@ -317,7 +320,7 @@ def _chart(chart: object, coordinates: np.ndarray, shape: tuple[int, int]) -> Ch
 
 def _consecutive(pairs: tuple[Pair, ...], k: int, chart: Chart) -> tuple[Pair, ...]:
     if len(pairs) < 2:  # the only pair is all of the problem, whatever was replaced in it
-        return (Pair(pairs[0].name if pairs else "contact", 0, k, chart),)
+        return (Pair(pairs[0].name if pairs else UNNAMED, 0, k, chart),)
     if [pair.start for pair in pairs] + [k] != [0] + [pair.stop for pair in pairs]:
         raise InputError(
             f"the pairs of surfaces must follow each other from contact 0 to contact {k - 1}."

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.files.toml_table import Table
 from contactopt.scenes.body_shapes import counts_of, grid_of, scale_of
 from contactopt.scenes.expressions import Expression
@@ -158,11 +159,11 @@ def _between(
         made = griddata(values[:, :-1], values[:, -1], grid)
     except (ValueError, RuntimeError) as error:
         raise table.fail("the measured places lie on one line.", "file") from error
-    if np.any(np.isnan(made)):
+    if lost := int(np.isnan(made).sum()):
         ranges = [f"{low:g} to {high:g}" for low, high in zip(values.min(0), values.max(0))]
         raise table.fail(
-            f"{int(np.isnan(made).sum())} points of the half-space lie outside of the measured"
-            f" places, which reach over {' and '.join(ranges[:-1])}.",
+            f"{count(lost, 'point lies', 'points lie')} outside of the measured places,"
+            f" which reach over {' and '.join(ranges[:-1])}.",
             "file",
         )
     return np.asarray(made)

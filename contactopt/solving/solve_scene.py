@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.coupling.posed import Posed, posed
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.defaults import TOL
@@ -180,11 +181,11 @@ def _one_way(
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         coarse = {"coarse": time.perf_counter() - begin}
-    options.note(f"solving {reduction.problem.contacts} contacts")
+    options.note(f"solving {count(reduction.problem.contacts, 'contact')}")
     if start is not None:
         first = transfer(start.reduction.problem, start.solution, reduction.problem)
     solved = _solved(reduction, first, options, coarse)
-    log.info("%s: %d elements, %s", scene.name, elements, solved.solution.status)
+    log.info("%s: %s, %s", scene.name, count(elements, "element"), solved.solution.status)
     return solved
 
 

@@ -56,6 +56,12 @@ def two_starts() -> tuple[int, int]:
     return active_set(Q_f, q_f, np.ones(319, bool))[1], active_set(Q_f, q_f, start)[1]
 
 
+@cache
+def coarse_steps() -> int:
+    """Steps on 160 elements from all nodes."""
+    return active_set(*string(160)[1:], np.ones(159, bool))[1]
+
+
 def sweep(together: bool = False, sweeps: int = 1) -> np.ndarray:
     """Projected Gauss-Seidel, or Jacobi if all nodes change together, on four elements."""
     _, Q, q = string(4, 0.07)
@@ -88,6 +94,15 @@ GRADED = {
     "3.4": (
         two_starts,
         (lambda: two_starts()[::-1], "order"),
+        (lambda: (two_starts()[0], coarse_steps()), "The second number is for 160 elements."),
+        (
+            lambda: (coarse_steps(), two_starts()[1]),
+            "The first number is for 160 elements. Count on 320.",
+        ),
+        (
+            lambda: (two_starts()[0], coarse_steps() + two_starts()[1]),
+            "Do not count the steps on the coarse mesh.",
+        ),
         (lambda: two_starts()[:1] * 2, "The start was not used: change the first `touches`."),
         (
             lambda: (two_starts()[0], 1),

@@ -60,6 +60,7 @@ GRADED = {
         lambda: Numbers(
             rate(),
             close=0.04,
+            given={"mu": 0.2},
             least=(0.0, "Certificates are positive, and so is their ratio."),
             most=(1.0, "The certificate falls: the factor is below one."),
         ),

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from copy import deepcopy
 from functools import cache
 from itertools import combinations, product
-from math import isclose
+from types import CodeType
 
 import numpy as np
 
@@ -30,11 +30,8 @@ OTHERS = {
     "arccos": "cos",
     "tan": "sin",
 }
-# pairs of changes and products of powers are tried up to here; more would match by chance
+# pairs of changes and products of quantities are tried up to here; more would match by chance
 MOST_CHANGES, MOST_QUANTITIES = 60, 7
-# an answer fits to a number by chance unless it gives so many digits
-ENOUGH_DIGITS = 4
-ANOTHER = "This is the value of `{}`, and another quantity is asked for."
 # changes that somebody makes less often than others, which explain an answer last, and never surely
 SELDOM = (
     "is added to",
@@ -69,11 +66,20 @@ WRONG_SIDE = "`{}` stands on the wrong side of a fraction"
 
 def value(formula: str, given: dict[str, float]) -> float:
     """The number that a formula gives."""
-    return _value(ast.parse(formula, mode="eval").body, given)
+    return _evaluated(_compiled(formula), given)
+
+
+@cache
+def _compiled(formula: str) -> CodeType:
+    return compile(formula, "formula", "eval")
 
 
 def _value(node: ast.expr, given: dict[str, float]) -> float:
     code = compile(ast.fix_missing_locations(ast.Expression(node)), "formula", "eval")
+    return _evaluated(code, given)
+
+
+def _evaluated(code: CodeType, given: dict[str, float]) -> float:
     with np.errstate(all="ignore"):
         return float(eval(code, {"__builtins__": {}}, NAMES | given))
 
@@ -99,10 +105,12 @@ def wrong_values(formula: str, given: Given, chapter: Given = ()) -> Found:
     ]
     between += [
         (tree, known | other, words)
-        for other, words in _misread(known, dict(chapter), inside, formula.startswith("ceil"))
+        for other, words in misread(known, dict(chapter), inside, formula.startswith("ceil"))
     ]
-    steps = [(node, f"This is `{ast.unparse(node)}`, a step on the way.") for node in _steps(tree)]
-    between += [(node, known, words) for node, words in steps]
+    on_the_way = [
+        (node, f"This is `{ast.unparse(node)}`, a step on the way.") for node in steps(tree)
+    ]
+    between += [(node, known, words) for node, words in on_the_way]
     tried[len(tried) - seldom : len(tried) - seldom] = between
     found: dict[float, tuple[float, list[str]]] = {}  # by ten digits
     right = value(formula, known)
@@ -113,10 +121,10 @@ def wrong_values(formula: str, given: Given, chapter: Given = ()) -> Found:
             continue
         if np.isfinite(number) and not np.isclose(number, right, rtol=1e-9):
             found.setdefault(rounded(number, 10), (number, []))[1].append(words)
-    return tuple((number, _told(ways)) for number, ways in found.values())
+    return tuple((number, told_of(ways)) for number, ways in found.values())
 
 
-def _told(ways: list[str]) -> str:
+def told_of(ways: list[str]) -> str:
     """The likeliest way to a number, and another one that is as likely and no part of it."""
     first = ways[0]
     if first[0].isupper():
@@ -137,7 +145,7 @@ def _subject(words: str) -> str:
     return words.split("`")[-2] if "`" in words else words
 
 
-def _steps(tree: ast.expr) -> list[ast.expr]:
+def steps(tree: ast.expr) -> list[ast.expr]:
     """The parts of a formula that hold a quantity and are more than that, the largest first."""
     return [
         node
@@ -177,10 +185,10 @@ def _once_more(tree: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.ex
                 yield node, f"This is the right answer, {done} {times} more by `{name}`."
 
 
-def _misread(
+def misread(
     given: dict[str, float], chapter: dict[str, float], inside: set[str], counts: bool
 ) -> Iterator[tuple[dict[str, float], str]]:
-    """Quantities inside a formula that are mistaken wherever they stand, and the mistake in words."""
+    """Quantities inside formulas that are mistaken wherever they stand, and the mistake in words."""
     given = {name: number for name, number in given.items() if name in inside}
     old = {name: number for name, number in chapter.items() if name in given}
     for names in (*((name,) for name in old), tuple(old)):
@@ -199,6 +207,17 @@ def _misread(
             yield {name: number + one}, f"`{name}` is one too {'many' if one > 0 else 'few'}"
     for (first, a), (second, b) in combinations(given.items(), 2):
         yield {first: b, second: a}, f"`{first}` and `{second}` are exchanged"
+    for name in (one.removesuffix("_nn") for one in given if one.endswith("_nn")):
+        entries = [f"{name}_{ij}" for ij in ("nn", "nt", "tt")]
+        if all(one in given for one in entries):
+            nn, nt, tt = (given[one] for one in entries)
+            inverse = np.array([tt, -nt, nn]) / (nn * tt - nt**2)
+            yield (
+                dict(zip(entries, inverse.tolist(), strict=True)),
+                f"the matrix `{name}` is confused with its inverse",
+            )
+            identity = dict(zip(entries, (1.0, 0.0, 1.0), strict=True))
+            yield identity, f"the matrix `{name}` is left out"
 
 
 @cache
@@ -212,15 +231,6 @@ def taken(formula: str, given: Given) -> Found:
         if np.isfinite(wrong):
             found.append((wrong, f"Perhaps `{name}` is taken {told}: then this comes out."))
     return tuple(found)
-
-
-def fits(answer: float, number: float) -> bool:
-    """Whether an answer is a number to all its digits, which are too many for a coincidence."""
-    if not isclose(answer, number, rel_tol=0.6 * 10 ** (1 - ENOUGH_DIGITS)):
-        return False  # quickly: most numbers are far away
-    digits = len(f"{abs(answer):.12e}".split("e")[0].replace(".", "").rstrip("0"))
-    exact = isclose(answer, number, rel_tol=1e-9)
-    return exact or (digits >= ENOUGH_DIGITS and answer == rounded(number, digits))
 
 
 def changed(node: ast.expr, given: dict[str, float]) -> Iterator[tuple[ast.expr, str]]:
@@ -334,60 +344,3 @@ def two_mistakes(formula: str, given: Given) -> Found:
             if np.isfinite(number):
                 found.append((number, f"Perhaps {first}, and {second}: then this comes out."))
     return tuple(found)
-
-
-@cache
-def _sums(formula: str, given: Given) -> Found:
-    """Sums and differences of a quantity and a quantity, a step of the formula or its value."""
-    known, tree = dict(given), ast.parse(formula, mode="eval").body
-    parts, found = dict(known), []
-    for (first, a), (second, b) in combinations(known.items(), 2):
-        if first.split("_")[0] != second.split("_")[0] or "_" not in first:
-            continue  # a mean is taken of quantities of one kind
-        found += [((a + b) / 2, ANOTHER.format(f"({first} + {second}) / 2"))]
-        if a * b > 0:
-            found += [((a * b) ** 0.5, ANOTHER.format(f"sqrt({first} * {second})"))]
-            harmonic = f"2 * {first} * {second} / ({first} + {second})"
-            found += [(2 * a * b / (a + b), ANOTHER.format(harmonic))]
-    for node in (tree, *_steps(tree)):
-        parts[ast.unparse(node)] = _value(node, known)
-    for (first, a), (second, b) in product(known.items(), parts.items()):
-        if first != second:
-            found += [(a + b, ANOTHER.format(f"{first} + {second}"))]
-            found += [(a - b, ANOTHER.format(f"{first} - {second}"))]
-            found += [(b - a, ANOTHER.format(f"{second} - {first}"))]
-    return tuple(found)
-
-
-def quantity(answer: float, given: dict[str, float], formula: str) -> str | None:
-    """What is told of an answer that is made of the given quantities: a sum, a difference, or
-    a product of powers with a simple factor.
-    """
-    known = {name: number for name, number in given.items() if number}
-    if not known or len(known) > MOST_QUANTITIES:
-        return None
-    for number, told in _sums(formula, tuple(known.items())):
-        if fits(answer, number):
-            return told
-    known = {name: number for name, number in known.items() if abs(number) not in (1.0, 2.0)}
-    exponents = (0, 1, -1, 2, -2) if len(known) <= 4 else (0, 1, -1)
-    powers = np.array(list(product(exponents, repeat=len(known))))
-    powers = powers[np.argsort(abs(powers).sum(axis=1), kind="stable")]
-    numbers = np.prod(np.array(list(known.values())) ** powers.astype(float), axis=1)
-    for factor, name in (
-        (1.0, ""),
-        (2.0, "2 * "),
-        (0.5, "0.5 * "),
-        (4.0, "4 * "),
-        (0.25, "0.25 * "),
-    ):
-        near = np.flatnonzero(np.isclose(factor * numbers, answer, rtol=1e-3, atol=0))
-        for k in near:
-            if fits(answer, factor * numbers[k]):
-                parts = [
-                    one if power == 1 else f"{one}**{power}"
-                    for one, power in zip(known, powers[k], strict=True)
-                    if power
-                ]
-                return ANOTHER.format(name + " * ".join(parts or ["1"]))
-    return None

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from experiments.course.combinations import ANOTHER, fits, product_of_two, quantity
 from experiments.course.mistakes import (
-    ANOTHER,
     BESIDES,
-    fits,
-    quantity,
+    misread,
     taken,
+    told_of,
     two_mistakes,
     value,
     wrong_values,
@@ -154,6 +154,7 @@ class Numbers:
             or self._related(answer, right)
             or self._from_formula(answer, i, likely=False)
             or _besides(answer, listed)
+            or self._made_of_two(answer)
             or self._two_mistakes(answer, i)
             or self._other_quantity(answer, i)
             or self._taken(answer, i)
@@ -182,7 +183,15 @@ class Numbers:
             for number, told in mistakes:
                 # two digits fit to the square of a quantity by chance
                 if same(answer, number) and (same is not _same_digits or "twice more" not in told):
-                    return wrong("formula", told)
+                    name = self._name(answer)
+                    return wrong("formula", f"This is `{name}`. {told}" if name else told)
+        return None
+
+    def _name(self, answer: float) -> str | None:
+        """The quantity that has this number in the exercise, unless the number says too little."""
+        for name, number in self.given.items():
+            if abs(number) not in (0.0, 1.0, 2.0) and self.agrees_alone(answer, number):
+                return name
         return None
 
     def _given(self, answer: float) -> Verdict | None:
@@ -190,6 +199,24 @@ class Numbers:
         for name, number in self.given.items():
             if number and self.agrees_alone(answer, number):
                 return wrong("combination", ANOTHER.format(name))
+        return None
+
+    def _made_of_two(self, answer: float) -> Verdict | None:
+        told = product_of_two(answer, self.given, self.agrees_alone)
+        return wrong("combination", told) if told else None
+
+    def _misread(self, answer: np.ndarray, good: int) -> Verdict | None:
+        """Whether all numbers follow from one quantity that was mistaken, as two of them show."""
+        if len(self.formulas) != answer.size or good > answer.size - 2:
+            return None
+        inside = {name for name in self.given if any(name in one for one in self.formulas)}
+        for other, told in misread(self.given, self.chapter, inside, self.counts):
+            try:
+                numbers = [value(one, self.given | other) for one in self.formulas]
+            except ArithmeticError:
+                continue
+            if self.resembles(answer, numbers):
+                return wrong("formula", told_of([told]))
         return None
 
     def _related(self, answer: float, right: float) -> Verdict | None:
@@ -223,14 +250,17 @@ class Numbers:
 
     def _other_quantity(self, answer: float, i: int) -> Verdict | None:
         """Whether an answer is another number of the exercise, or made of its numbers."""
-        right = np.ravel(np.asarray(self.value, dtype=float))
         if answer == 0:
             return wrong("zero", "Zero would mean that nothing acts here. Look at the loads again.")
-        for j in range(right.size):
-            if j != i and self.agrees_alone(answer, right[j]):
-                return wrong("place", f"This is the right number {j + 1}: it belongs there only.")
         told = quantity(answer, self.given, self._formula(i))
         return wrong("combination", told) if told else None
+
+    def _place(self, answer: float, i: int) -> Verdict | None:
+        """Whether an answer is another one of the right numbers."""
+        for j, right in enumerate(np.ravel(np.asarray(self.value, dtype=float))):
+            if j != i and right and self.agrees_alone(answer, right):
+                return wrong("place", f"This is the right number {j + 1}: it belongs there only.")
+        return None
 
     def agrees_alone(self, answer: float, right: float) -> bool:
         """Whether one number is right by itself."""
@@ -248,16 +278,20 @@ class Numbers:
                 return wrong(kind, told)
         pairs = list(zip(answer.ravel(), value.ravel(), strict=True))
         good = [i + 1 for i, (a, b) in enumerate(pairs) if self._good(a, b, value)]
-        head = f"Of your {value.size} numbers these are right: {good}. " if good else ""
+        whole = self._misread(answer, len(good))
+        if whole:
+            return whole
+        told: dict[str, list[str]] = {}  # the numbers that share a sentence
         for i, (a, b) in enumerate(pairs):
-            if not self._good(a, b, value):
-                found = self._one(float(a), i)
-                if found:
-                    told = found.sentence.removeprefix("not right yet. ")
-                    return wrong("part", f"{head}Number {i + 1}: {told}")
-        if good:
-            return wrong("part", head.strip())
-        return self._size(answer, value)
+            found = None if self._good(a, b, value) else self._place(a, i) or self._one(float(a), i)
+            if found:
+                told.setdefault(found.sentence.removeprefix("not right yet. "), []).append(
+                    f"{i + 1}"
+                )
+        parts = [f"Of your {value.size} numbers these are right: {good}."] if good else []
+        for one, numbers in told.items():
+            parts.append(f"Number{'s' * (len(numbers) > 1)} {' and '.join(numbers)}: {one}")
+        return wrong("part", " ".join(parts)) if parts else self._size(answer, value)
 
     def _good(self, a: float, b: float, value: np.ndarray) -> bool:
         least = 0.1 * self.close * abs(value).max()
@@ -269,7 +303,7 @@ class Numbers:
         if a > 2 * b or b > 2 * a:
             told = "more than twice as large as it should be" if a > b else "less than half of it"
             return wrong("size", f"Your answer is {told}.")
-        if np.allclose(answer, value, rtol=0.03, atol=0.03 * b):
+        if np.allclose(answer, value, rtol=0, atol=0.03 * b):
             return wrong(
                 "near", "You are within 3 percent: a small term is missing, or some digits."
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import floor, log10, trunc
 
+TIE = 1e-6  # relative error of answers that are computed by an iteration, for which ties are missed
 CLOSE = 1e-3  # relative error of numbers, and certificate of forces, that still counts as right
 
 
@@ -28,7 +29,7 @@ def wrong(kind: str, sentence: str, contact: int | None = None) -> Verdict:
 
 def rounded(x: float, digits: int) -> float:
     """x with so many digits; half a unit, also if the computer has a little less, is rounded up."""
-    return float(f"{x * (1 + 1e-12):.{digits}g}")
+    return float(f"{x * (1 + TIE):.{digits}g}")
 
 
 def shortened(x: float, digits: int) -> tuple[float, float]:

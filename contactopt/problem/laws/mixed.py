@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.problem.laws.law import Kinks, Law, Projected
 
@@ -28,7 +29,7 @@ class Mixed(Law):
         for law, own in zip(self.parts, self.members, strict=True):
             if law.contacts != len(own):
                 raise InputError(
-                    f"a law of {law.contacts} contacts was given for {len(own)} of them."
+                    f"a law of {count(law.contacts, 'contact')} was given for {len(own)} of them."
                 )
         for flag in ("convex", "proportional", "bounded", "opens"):
             object.__setattr__(self, flag, all(getattr(law, flag) for law in self.parts))
@@ -118,7 +119,9 @@ class Mixed(Law):
 
     def spread(self, k: int) -> Mixed:
         if self.contacts != k:
-            raise InputError(f"the laws rule {self.contacts} contacts; the problem has {k}.")
+            raise InputError(
+                f"the laws rule {count(self.contacts, 'contact')}; the problem has {k}."
+            )
         return self
 
     @property
