@@ -296,7 +296,11 @@ MEANT = {
         + "*ELEMENT, TYPE=CPE4\n1,1,2,12,11\n",
         3, {"LOW": 3, "UP": 3}, 8,
     ),
-    "unknown words in a step": (ONE + RIGHT + "*STEP\n*SOLVE IT\n1\n*END STEP\n", 1, {"S": 1}, 4),
+    "quotation marks in a heading": ('*HEADING\n5" pipe, old\n' + ONE + RIGHT, 1, {"S": 1}, 4),
+    "unknown words in a step": (
+        ONE + RIGHT + "*STEP\n*SOLVE IT\n1\n*MODEL CHANGE, TYPE=CONTACT PAIR, ADD\n*END STEP\n",
+        1, {"S": 1}, 4,
+    ),
     "words after another": (
         ONE + RIGHT + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nN,20.\n*TIE, NAME=T\nS,S\n*TRANSFORM,"
         "NSET=N,TYPE=C\n0,0,0,0,0,1\n*ORIENTATION,NAME=O\n1,0,0,0,1,0\n*AMPLITUDE,NAME=A\n0,0,1,1\n",
@@ -367,6 +371,12 @@ REFUSED = {
     ),
     "no number of a node": (ONE.replace("3,1,1", ",1,1"), 4, "a number is missing"),
     "instance of none": ("*ASSEMBLY\n*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n", 2, "part P"),
+    "elements that are removed": (
+        ONE + RIGHT + "*STEP\n*MODEL CHANGE, TYPE=ELEMENT, REMOVE\nB\n*END STEP\n", 11, "CHANGE",
+    ),
+    "a crack through elements": (ONE + "*ENRICHMENT, NAME=C, ELSET=B\n", 8, "ENRICHMENT"),
+    "an open quotation of a keyword": (ONE.replace("ELSET=B", 'ELSET="B'), 6, "quotation"),
+    "an open quotation of data": (ONE + '*SURFACE, NAME=S\nB, S1\n"B, S3\n', 10, "quotation"),
     "axis of no length": (
         f"*PART, NAME=P\n{ONE}*END PART\n*ASSEMBLY\n*INSTANCE, NAME=I, PART=P\n0,0,0\n"
         "0,0,0,0,0,0,90\n*END INSTANCE\n*END ASSEMBLY\n", 13, "axis",
@@ -535,7 +545,7 @@ def test_a_mix_of_elements_is_told_with_groups_that_are_none(tmp_path):
 def test_facets_inside_a_body_are_told(tmp_path, caplog):
     (tmp_path / "deck.inp").write_text(GROWN + "*SURFACE, NAME=S\n1, S1\n1, S2\n")
     assert measure(load_mesh(tmp_path / "deck.inp"), "S") == pytest.approx(1.0)
-    assert "1 facets of S lie inside the body" in caplog.text
+    assert "holds 1 facet of S, inside the body" in caplog.text
 
 
 @pytest.mark.parametrize("kind", ["tri", "quad", "tet", "hex"])
@@ -619,10 +629,21 @@ CARDS += "CTETRA,1,7,1,2,3,4\nCBAR,2,8,1,2\n"
             "a.inp",
             f"*PART, NAME=P\n{BRICK}\n{FACE}*SHELL SECTION, ELSET=SKIN\n*END PART\n*ASSEMBLY\n"
             "*INSTANCE, NAME=I, PART=P\n0,0,2\n*END INSTANCE\n*END ASSEMBLY\n",
-            "a.inp, line 15: the stiffness of 1 elements S4",
+            "a.inp, line 15: the stiffness of 1 element S4",
         ),
+        (
+            "a.inp",
+            ONE + "*SOLID SECTION, ELSET=B, MATERIAL=M\n2.,",
+            "a.inp, line 8: the thickness 2 of 1 element CPE4",
+        ),
+        ("a.inp", ONE + "*SOLID SECTION, ELSET=B, MATERIAL=M\n1.", ""),
+        ("a.inp", ONE + "*REBAR, ELEMENT=CONTINUUM\nB,1", "a.inp, line 8: the stiffness of *REBAR"),
         ("a.bdf", CARDS + "PSOLID,7,1\nENDDATA", ""),
-        ("a.bdf", CARDS + "PBAR,8,1,1.,1.,1.,1.\nENDDATA", "a.bdf, line 6: the stiffness of 1"),
+        (
+            "a.bdf",
+            CARDS + "PBAR,8,1,1.,1.,1.,1.\nENDDATA",
+            "a.bdf, line 6: the stiffness of 1 element of",
+        ),
     ],
 )
 def test_what_stiffens_no_body_is_told_in_every_run_with_the_mesh(tmp_path, name, text, told):

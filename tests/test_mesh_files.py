@@ -246,7 +246,7 @@ def test_repairs_are_logged(tmp_path, caplog):
     assert flux(mesh) == pytest.approx(4)
     for what in (
         "nodes that lie on others",
-        "1 elements are there twice",
+        "1 element is there twice",
         "quad number 2 of the file",
         "3 nodes of the file",
     ):

@@ -118,6 +118,30 @@ def test_a_plate_on_a_contact_surface_is_told():
     assert any("the plate on 'low' of body 'one'" in note for note in notes)
 
 
+@pytest.mark.parametrize("kind", ["plane-strain", "plane-stress"])
+@pytest.mark.parametrize("depth", [0.01, 10.0])
+def test_a_force_strains_a_thick_body_less(kind, depth):
+    scene = replace(pressed(), kind=kind, thickness=depth)
+    one = replace(scene.bodies[0], loads=(Plate("up", {"y": -1e-3}),))
+    notes = said(replace(scene, bodies=(one, scene.bodies[1])))
+    assert any("the loads strain body 'one' by about" in note for note in notes) == (depth > 1)
+
+
+def test_a_supported_point_without_force_has_no_infinite_stress():
+    """A block under even pressure on a floor, and one more that is pushed against its pin."""
+    scene = pressed()
+    sides = {"left": lambda p: np.isclose(p[0], 0), "up": lambda p: np.isclose(p[1], 10)}
+    mesh = scene.bodies[0].mesh.with_boundaries(sides)
+    for push in (0.0, 1.0):
+        loads = (Traction("up", (0.0, -1.0)), Traction("left", (push, 0.0)))
+        pin = (Support("left/up", {"x": 0.0}),)
+        one = Part("one", mesh, STEEL, pin, loads, contact="low")
+        scene = Scene("pinned", one, Rigid("floor"), 0.0)
+        assert any("holds a point" in note for note in check_scene((scene,)).notes)
+        remarks = run(scene, figures=()).summary["remarks"]
+        assert any("holds a point" in text for text in remarks) == (push > 0)
+
+
 @pytest.mark.parametrize("copies, told", [(1, False), (2, True), (3, True), (4, True)])
 def test_copies_without_planes_of_symmetry_are_told(copies, told):
     """A half model has one plane, a quarter has two; a body that nothing halves has none."""

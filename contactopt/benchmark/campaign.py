@@ -150,7 +150,11 @@ def run_reports(
     paths = [Path(path) for path in experiments]
     missing = set(names) - {path.stem for path in paths}
     if missing:
-        raise InputError(f"unknown experiments: {', '.join(sorted(missing))}.")
+        known = ", ".join(sorted(path.stem for path in paths)) or "none"
+        raise InputError(
+            f"there is no experiment {', '.join(sorted(missing))}, and no folder of that name that"
+            f" holds the results of a campaign; the experiments are {known}."
+        )
     if version not in ("", "quick", "full"):
         raise InputError(f"unknown version {version!r}; choose quick or full.")
     work = Path("out", version)

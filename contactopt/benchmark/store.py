@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 SCHEMA = 1  # of COLUMNS; a reader refuses newer ones
 
 STATUSES = {status.label: status.sentence for status in Status} | ENDS
+WORDS = {"int": "a whole number", "str": "a text", "float": "a number", "bool": "true or false"}
 TYPES = {"int": "int64", "str": "str", "float": "float64", "bool": "bool"}  # in a table
 UNKNOWN = {"int": 0, "str": "", "float": np.nan, "bool": False}  # what stands for no value yet
 # columns that load() works out, or that older rows do not have
@@ -139,17 +140,17 @@ def lines(path: Path) -> Iterator[dict[str, Any]]:
 def _wrong(row: object) -> str:
     """What makes a row none of a campaign, "" for nothing."""
     if not isinstance(row, dict):
-        return "this is no row"
+        return "the line is no row of a campaign"
     for name, (kind, _) in COLUMNS.items():
         if name not in LATER and not _is(row.get(name), kind):
-            return f"the row has no '{name}' of the kind {kind}"
+            return f"its '{name}' is missing, or is not {WORDS[kind]}"
     try:
         _unpack(row.get("answer", ""))
         for name, form in (("parameters", dict), ("settings", dict), ("history", list)):
             if row[name] and not isinstance(json.loads(row[name]), form):
-                return f"'{name}' of the row holds no {form.__name__}"
+                return f"its '{name}' holds no {'table' if form is dict else 'list'}"
     except (ValueError, TypeError, RecursionError):
-        return "an entry of the row cannot be read"
+        return "an entry of it cannot be read"
     return ""
 
 
@@ -292,7 +293,7 @@ def _of_their_kinds(table: pd.DataFrame, path: Path, word: str, first: int) -> p
             empty = column.isna() | column.isin(["", "nan"])
             table[name] = pd.to_numeric(column, errors="coerce")
             bad = table[name].isna() & ~empty if kind == "float" else table[name] % 1 != 0
-        wrong = wrong.mask(bad & (wrong == ""), f"the row has no '{name}' of the kind {kind}")
+        wrong = wrong.mask(bad & (wrong == ""), f"its '{name}' is not {WORDS[kind]}")
     for index, why in wrong[wrong != ""].items():
         _log.warning("'%s', %s %d: %s; it is left out", path, word, index + first, why)
     table = table[wrong == ""].reset_index(drop=True)

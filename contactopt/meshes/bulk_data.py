@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import count
 from contactopt.errors import Damaged, InputError
 from contactopt.meshes.inp_elements import CORNERS
 from contactopt.meshes.inp_text import text_of
@@ -138,8 +139,8 @@ class _Reader:
         for kind, rows in self.elements.items():
             lines = [line for line, group, _ in rows if group in self.sections]
             if kind.startswith(thin) and lines:
-                said = "%s, line %d: the stiffness of %d elements of type %s is left out"
-                log.warning(said, self.path, lines[0], len(lines), kind)
+                said = "%s, line %d: the stiffness of %s of type %s is left out"
+                log.warning(said, self.path, lines[0], count(len(lines), "element"), kind)
 
     def _element(self, line: int, card: list[str]) -> None:
         name, first = card[0], FIRST.get(card[0], 3)

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -95,6 +96,12 @@ def _places(ids: np.ndarray, found: Iterable[int]) -> np.ndarray:
     return np.flatnonzero(np.isin(ids, np.fromiter(found, np.int64)))
 
 
+def _thickness(block: Block) -> float:
+    """The number below a section of plane elements, 1 without one."""
+    solid = [(line, words[0]) for line, words in block.rows if block.keyword == "solidsection"]
+    return block.real(*solid[0]) if solid and solid[0][1] else 1.0
+
+
 def _instance(parts: dict[str, Scope], block: Block) -> Scope:
     """A copy of a part, moved along the first row, then turned about the axis of the second."""
     name, of = block.need("name"), block.need("part")
@@ -137,7 +144,10 @@ class Scope:
     def read(self, block: Block) -> None:
         """Do what a block says, now or, where what it names is not there yet, in settle()."""
         try:
-            getattr(self, "section" if block.keyword in SECTIONS else block.keyword)(block)
+            if block.keyword in SECTIONS:
+                self.sections.append((self, 0, block))
+                return
+            getattr(self, block.keyword)(block)
             block.rows = []
         except Later:
             self.later.append(block)
@@ -172,8 +182,8 @@ class Scope:
         self.nodes |= zip((tag + by for tag in own.nodes), map(tuple, places.tolist()))
         self.elements.update(i + by for i in own.elements)
         self.sections += [(own, by, block) for _, _, block in own.sections]
-        for name, count in own.passed.items():
-            self.passed[name] = self.passed.get(name, 0) + count
+        for name, number in own.passed.items():
+            self.passed[name] = self.passed.get(name, 0) + number
         for number, (kind, nodes, ids, where) in enumerate(own.blocks):
             self.types[len(self.blocks)] = own.types[number]
             self.blocks.append((kind, np.where(nodes > 0, nodes + by, 0), ids + by, where))
@@ -224,22 +234,23 @@ class Scope:
                         raise block.fail(f"'{name}' names {word}, which is not there", line)
                     del found[number]
 
-    def section(self, block: Block) -> None:
-        self.sections.append((self, 0, block))
-
     def tell_sections(self) -> None:
         """Warn of shells and lines beside solids, or lines beside plane elements, that have a
-        section: they may name boundaries, but stiffen no body.
+        section: they may name boundaries, but stiffen no body. Warn of the thickness of plane
+        elements, which a scene gives.
         """
         most = max(dimension(named) for named in self.types.values())
         for own, by, block in self.sections:
             sets = {bare(name): found for name, found in own.element_sets.items()}
             members = sets.get(bare(block.options.get("elset", "")), ())
             for place, (_, _, ids, _) in enumerate(self.blocks):
-                count = len(_places(ids - by, members))
-                if count and 0 < dimension(self.types[place]) < most:
-                    said = "the stiffness of %d elements %s is left out"
-                    block.warn(said, count, self.types[place])
+                many = len(_places(ids - by, members))
+                if many and 0 < dimension(self.types[place]) < most:
+                    said = "the stiffness of %s %s is left out"
+                    block.warn(said, count(many, "element"), self.types[place])
+                elif many and most == 2 and (depth := _thickness(block)) != 1:
+                    said = "the thickness %g of %s %s is left out; give it to the scene"
+                    block.warn(said, depth, count(many, "element"), self.types[place])
 
     def node(self, block: Block) -> None:
         tags, rows = list[int](), list[list[float]]()
@@ -267,19 +278,19 @@ class Scope:
     def element(self, block: Block) -> None:
         named = block.need("type").upper()
         try:
-            kind, count = kind_of(named)
+            kind, nodes = kind_of(named)
         except ValueError as error:
             raise block.fail(str(error)) from None
         rows, where = list[list[int]](), list[tuple[Block, int]]()
         for line, words in block.rows:
-            if not rows or not kind or len(rows[-1]) == 1 + count:
+            if not rows or not kind or len(rows[-1]) == 1 + nodes:
                 rows.append([])
                 where.append((block, line))
             rows[-1] += [block.whole(line, word) for word in words]
-            if kind and len(rows[-1]) > 1 + count:
-                raise block.fail(f"an element {named} has a number and {count} nodes", line)
-        if kind and rows and len(rows[-1]) < 1 + count:
-            raise block.fail(f"an element {named} lacks some of its {count} nodes", where[-1][1])
+            if kind and len(rows[-1]) > 1 + nodes:
+                raise block.fail(f"an element {named} has a number and {nodes} nodes", line)
+        if kind and rows and len(rows[-1]) < 1 + nodes:
+            raise block.fail(f"an element {named} lacks some of its {nodes} nodes", where[-1][1])
         width = max((len(row) for row in rows), default=1)
         table = np.array([row + [0] * (width - len(row)) for row in rows], dtype=np.int64)
         table = table.reshape(-1, width)

@@ -44,9 +44,11 @@ SECTIONS = {
     *("beamsection", "beamgeneralsection", "framesection", "membranesection"),
     *("shellsection", "shellgeneralsection", "solidsection"),
 }
+STIFFENING = {"foundation", "rebar", "rebarlayer"}  # keywords of what elements do not show
 DEEPEST = 10  # files that include each other
 LARGEST = 2**31  # numbers of nodes, elements and lines are smaller
 FAR = 1e100  # larger coordinates have no volume in floating-point numbers
+OPEN = "a quotation mark is not closed"
 COMMA = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')  # not within quotation marks
 Row = tuple[int, list[str]]  # place of the line in Source, and words
 
@@ -149,6 +151,8 @@ def blocks(path: Path) -> Iterator[Block]:
             continue
         while text.endswith(",") and lines and _goes_on(text, lines[-1][1]):
             text += lines.pop()[1]
+        if text.count('"') % 2:
+            raise Block(source, place, "", {}).fail(OPEN)
         first, *words = _words(text[1:])
         pairs = (word.partition("=") for word in words if word)
         options = {bare(key): value.strip().strip('"').strip() for key, _, value in pairs}
@@ -188,6 +192,10 @@ def _known(block: Block, stepping: bool) -> Iterator[Block]:
     if block.keyword in SECTIONS:
         yield block
         return
+    if block.keyword in STIFFENING:
+        block.warn("the stiffness of *%s is left out", block.keyword.upper())
+    if block.keyword == "modelchange" and block.options.get("type", "element").lower() == "element":
+        raise block.fail("*MODEL CHANGE of elements is not read; write the mesh that is meant")
     if block.keyword not in READ:
         if not stepping and block.keyword not in harmless():
             raise block.fail(
@@ -198,6 +206,9 @@ def _known(block: Block, stepping: bool) -> Iterator[Block]:
     _check_options(block)
     if "input" in block.options:
         block.rows += [(place, _words(text)) for place, text in reversed(_other(block))]
+    for place, words in block.rows:
+        if any(word.count('"') % 2 for word in words):
+            raise block.fail(OPEN, place)
     yield block
 
 

@@ -268,14 +268,14 @@ def _boundaries(
         hits, others = [], list[tuple[int, ...]]()
         for i, elements in groups.members[name, dim - 1].items():
             kind, nodes, _ = groups.blocks[i]
-            count = 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])
-            facets = np.sort(number[nodes[elements][:, :count]], axis=1)
+            many = 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])
+            facets = np.sort(number[nodes[elements][:, :many]], axis=1)
             keys = [key for key in map(tuple, facets.tolist()) if key[0] >= 0]
             hits += [place[key] for key in keys if key in place]
             others += [key for key in keys if key not in place]
         if others and (inside := len(_inner(mesh).intersection(others))):
-            said = "%d facets of %s lie inside the body: no boundary of it holds them"
-            log.warning(said, inside, name)
+            said = "no boundary of the body holds %s of %s, inside the body"
+            log.warning(said, count(inside, "facet"), name)
         if hits:
             found[name] = outer[np.unique(hits)]
     skin = np.isin(np.arange(mesh.nvertices), corners)

@@ -19,6 +19,7 @@ import skfem
 from scipy.spatial import cKDTree
 from skfem import Mesh
 
+from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.errors import InputError
 from contactopt.meshes.cells import (
@@ -134,8 +135,8 @@ def _unfolded(mesh: Mesh, points: np.ndarray) -> Any:
             break
         points[:, back], kept = mesh.doflocs[:, back], kept + len(back)
     if kept:
-        said = "%d nodes stay off the curved boundary, where they would turn elements inside out"
-        log.warning(said, kept)
+        said = "%s off the curved boundary, where it would turn elements inside out"
+        log.warning(said, count(kept, "node stays", "nodes stay"))
     return replace(mesh, doflocs=points)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import skfem
 from scipy.spatial import KDTree
 
+from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import Damaged, InputError
@@ -142,8 +143,9 @@ def representatives(cells: Cells, repair: bool = True) -> np.ndarray:
     if repair:
         log.warning(
             "%s: nodes that lie on others are merged with them,"
-            " the first at (%s); %d pairs, at most %.3g apart",
-            cells.path, place_words(cells.points[:, pairs[0, 0]]), len(pairs), distance[same].max(),
+            " the first at (%s); %s, at most %.3g apart",
+            cells.path, place_words(cells.points[:, pairs[0, 0]]), count(len(pairs), "pair"),
+            distance[same].max(),
         )  # fmt: skip
     label = joined(pairs.T, len(own))
     return np.asarray(np.unique(label, return_index=True)[1][label])
@@ -176,15 +178,14 @@ def repaired(cells: Cells, merged: np.ndarray) -> Cells:
         raise cells.refused(flat[0], "two corners coincide in {}; mesh this place anew.")
     once = np.sort(np.unique(sets, axis=1, return_index=True)[1])
     if len(once) < sets.shape[1]:
-        dropped = sets.shape[1] - len(once)
-        log.warning("%s: %d elements are there twice and are dropped", cells.path, dropped)
+        words = count(sets.shape[1] - len(once), "element is", "elements are")
+        log.warning("%s: %s there twice and dropped", cells.path, words)
     cells = replace(cells, nodes=merged[cells.nodes[:, once]], numbers=cells.numbers[once])
     wrong = _volumes(cells.points, cells.corners) < 0
     if wrong.any():
         log.warning(
-            "%s: %d elements number their corners the wrong"
-            " way round and are turned, the first is %s",
-            cells.path, wrong.sum(), cells.name(int(np.argmax(wrong))),
+            "%s: %s with corners in the wrong order, which is turned round; the first is %s",
+            cells.path, count(int(wrong.sum()), "element"), cells.name(int(np.argmax(wrong))),
         )  # fmt: skip
         nodes = cells.nodes.copy()
         nodes[:, wrong] = mirrored(cells.kind, nodes[:, wrong])
@@ -196,11 +197,11 @@ def check_connected(cells: Cells, hint: str) -> None:
     """Raise InputError, with a hint, if the elements fall into pieces that share no node."""
     first = np.broadcast_to(cells.corners[0], cells.corners.shape)
     label = joined(np.stack([first, cells.corners]).reshape(2, -1), cells.points.shape[1])
-    count = len(np.unique(label[cells.corners[0]]))
-    if count > 1:
+    pieces = len(np.unique(label[cells.corners[0]]))
+    if pieces > 1:
         raise InputError(
             f"mesh file '{cells.path}': the body falls into"
-            f" {count} pieces that share no node; {hint}."
+            f" {pieces} pieces that share no node; {hint}."
         )
 
 
@@ -250,9 +251,9 @@ def _volumes(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     if len(corners) == len(points) + 1:
         axes = [c[:, i] - c[:, 0] for i in range(1, len(corners))]
     else:  # from the corners of one side to those of the side across; in the plane half of them
-        dim, count = len(points), len(corners) // 2
+        dim, half = len(points), len(corners) // 2
         ends = [([1, 2, 5, 6], [0, 3, 4, 7]), ([2, 3, 6, 7], [0, 1, 4, 5])]
         ends += [([4, 5, 6, 7], [0, 1, 2, 3])]
-        sides = [(c[:, b[:count]], c[:, a[:count]]) for b, a in ends[:dim]]
+        sides = [(c[:, b[:half]], c[:, a[:half]]) for b, a in ends[:dim]]
         axes = [far.sum(axis=1) - near.sum(axis=1) for far, near in sides]
     return np.asarray(np.linalg.det(np.stack(axes).transpose(2, 0, 1)))

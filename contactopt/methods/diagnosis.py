@@ -25,7 +25,7 @@ from contactopt.errors import InputError
 from contactopt.linear.operators import NOISE
 from contactopt.methods.cone import Relaxation
 from contactopt.methods.driver import solve
-from contactopt.methods.notes import MUCH
+from contactopt.methods.notes import LOOSE, MUCH
 from contactopt.methods.thresholds import (
     Local,
     Thresholds,
@@ -47,7 +47,6 @@ from contactopt.problem import (
 from contactopt.problem.cones import coulomb_cone
 
 DISTINCT = 1e-6  # a residual above this is none of a solution; up to TOL it is
-LOOSE = 1e12  # condition above which rounding decides
 
 
 def _trust(at: Local) -> str:

@@ -10,14 +10,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-import numpy as np
-
 from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.certificate import amplification
 
 # a remark is due if a small problem has so large a condition, and its forces so large an error
 FEW, WEDGED, MUCH = 50, 1e4, 1e-3
+LOOSE = 1e12  # condition above which rounding decides
 EXACT = 1e-11  # certificate that leaves no doubt below a condition of 1e8
 _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs", default=None)
 
@@ -42,15 +41,23 @@ def collected() -> Iterator[list[str]]:
 
 
 def remark(problem: InterfaceProblem, solution: Solution) -> None:
-    """Say where the forces of a small problem may be far off although they are certified."""
+    """Say where the forces of a small problem may be far off although they are certified. Forces
+    that contacts at one place exchange are contactopt.methods.exchanged's to speak of.
+    """
     at, loose = solution, solution.solved and solution.residual > EXACT
-    if loose and problem.contacts <= FEW and form(problem.Q) == "array":
-        condition = amplification(problem, at.reactions, at.multipliers)
-        if WEDGED < condition < np.inf and condition * at.residual > MUCH:
-            asked = problem.law.proportional and not problem.law.dilatant
-            note(
-                logging.getLogger(__name__),
-                "The forces are certified, but they may be off by"
-                f" {min(condition * at.residual, 1.0):.0%} of the typical force, because the"
-                f" solution is nearly not unique{': see contactopt.diagnose' if asked else ''}.",
-            )
+    if not loose or problem.contacts > FEW or form(problem.Q) != "array":
+        return
+    condition = amplification(problem, at.reactions, at.multipliers)
+    if condition <= WEDGED or condition * at.residual <= MUCH:
+        return
+    why = (
+        f"by {min(condition * at.residual, 1.0):.0%} of the typical force, because the solution is"
+    )
+    why += " nearly not unique"
+    if not condition < LOOSE:
+        if problem.shared_places:
+            return
+        why = "by any amount, because they are not unique, or nearly not"
+    if problem.law.proportional and not problem.law.dilatant:
+        why += ": see contactopt.diagnose"
+    note(logging.getLogger(__name__), f"The forces are certified, but they may be off {why}.")

@@ -38,6 +38,7 @@ from contactopt.scenes.body_kinds import Support
 from contactopt.scenes.parameters import MATERIAL, Parameter
 from contactopt.scenes.scene import Scene
 
+UNFELT = 1e-6  # share of the forces on a body that a support may bear and is taken to bear none
 Slopes: TypeAlias = Callable[[State], Seeds]
 Reader: TypeAlias = Callable[[Reduction, Solution], Reading]
 
@@ -125,6 +126,15 @@ def _held(number: int, boundary: str, axis: int, state: State) -> tuple[np.ndarr
     own = body.unknowns[:, _nodes(body, boundary)]
     w[own] = way[:, None] * held[own]
     return w, bool(held[own[axis]].any())
+
+
+def bears(state: State, number: int, boundary: str) -> bool:
+    """Whether more than rounding of the forces on a body is borne by what holds a boundary."""
+    body, U, F = _at(state, number), state.displaced[number], state.forces[number]
+    own = np.setdiff1d(body.unknowns[:, _nodes(body, boundary)], body.free)
+    given = body.load + F
+    missing = np.abs(state.reduction.bodies[number].internal_forces(U, F) - given)
+    return bool(missing[own].sum() > UNFELT * (missing.sum() + np.abs(given).sum()))
 
 
 def _reaction(number: int, boundary: str, axis: int, state: State) -> Seeds:

@@ -4,7 +4,8 @@ bodies that are misplaced, loads on a surface that may touch. `check` and `run` 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from itertools import combinations
 from typing import Any
 
@@ -14,7 +15,6 @@ from contactopt.cards import count
 from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
-from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.material_library import STRESSES
 from contactopt.scenes.matrix_part import MatrixPart
 from contactopt.scenes.scene import Part, Scene
@@ -37,14 +37,19 @@ def doubts(
     couplings: Sequence[Coupling],
     planes: Sequence[SymmetryPlane],
     states: Sequence[Scene] = (),
+    bears: Callable[[int, str], bool] = lambda number, boundary: True,
 ) -> list[str]:
     """One sentence for everything about a scene that is probably not as it is meant; `planes` are
-    those of symmetry, `states` the scenes of its load path, if it has one.
+    those of symmetry, `states` the scenes of its load path, if it has one, and `bears` says whether
+    a force acts on a supported boundary of the body with a number, where that is known.
     """
     meshed = [part for part in scene.meshed.values() if part.given]
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]
     found += [note for part in meshed for note in _faint_loads(scene, part)]
-    found += [note for part in meshed for note in _pointed(part)]
+    numbers = {part.name: number for number, part in enumerate(scene.parts)}
+    found += [
+        note for part in meshed for note in _pointed(part, partial(bears, numbers[part.name]))
+    ]
     if not any(_pushed(state, couplings) for state in states or (scene,)):
         found.append(UNPUSHED)
     found += _missing_planes(scene, planes)
@@ -75,11 +80,11 @@ def _missing_planes(scene: Scene, planes: Sequence[SymmetryPlane]) -> list[str]:
     ]
 
 
-def _pointed(part: Part) -> list[str]:
+def _pointed(part: Part, bears: Callable[[str], bool]) -> list[str]:
     """Supports where the stress of a force is infinite."""
     notes, known = [], part.mesh.boundaries or {}
     for support in part.supports:
-        if (many := len(support.faces(known))) > 1:
+        if (many := len(support.faces(known))) > 1 and bears(support.boundary):
             what = "a point" if many >= part.mesh.dim() else "an edge"
             notes.append(
                 f"the support on '{support.boundary}' of body '{part.name}' holds {what}: the"
@@ -117,7 +122,7 @@ def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
 def _faint_loads(scene: Scene, part: Part) -> list[str]:
     """Loads that strain a body by next to nothing."""
     area = float(np.linalg.norm(np.ptp(part.mesh.p, axis=1))) ** (scene.dim - 1)
-    depth = scene.thickness if scene.kind == "plane-strain" else 1.0
+    depth = _depth(scene, part.mesh.p)
     stress = 0.0
     for load in part.loads:
         if load.boundary:
@@ -131,6 +136,12 @@ def _faint_loads(scene: Scene, part: Part) -> list[str]:
         f"the loads strain body '{part.name}' by about {strain:.0e} only: are its loads and"
         f" E = {part.material.E:.3g} in the same unit, as N and MPa with lengths in mm?"
     ]
+
+
+def _depth(scene: Scene, x: np.ndarray) -> float:
+    """How deep a body is across its section, around an axis at its mean radius; 1 in space."""
+    radius = float(abs(x[0]).mean()) if scene.analysis.revolved else 1.0
+    return scene.analysis.measure(scene.thickness) * radius
 
 
 def _stiffness(scene: Scene) -> list[str]:
@@ -164,10 +175,8 @@ def _moduli(scene: Scene) -> dict[str, tuple[float, str]]:
             if diagonal.any():
                 x = part.coordinates(scene.dim)
                 h = float(np.prod(np.ptp(x, axis=1)) / x.shape[1]) ** (1 / scene.dim)
-                kind = KINDS[scene.kind]
-                depth = kind.measure(scene.thickness) * (abs(x[0]).mean() if kind.revolved else 1)
                 usual = float(np.median(diagonal[diagonal > 0]))
-                own = usual * h ** (2 - scene.dim) / (depth * scene.copies)
+                own = usual * h ** (2 - scene.dim) / (_depth(scene, x) * scene.copies)
                 known[part.name] = own, "are K and its points in the units of the scene, stress"
         elif hasattr(part, "material"):
             known[part.name] = part.material.E, "is it"

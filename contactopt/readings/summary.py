@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.linear.operators import has_entries
 from contactopt.problem import Solution
+from contactopt.readings.node_sets import bears
 from contactopt.readings.peaks import pressure_reading
 from contactopt.readings.plate_motions import approach
 from contactopt.readings.plausibility import doubts
 from contactopt.readings.resolution import remarks, smoothed
 from contactopt.readings.resultants import mirrors, tables
+from contactopt.readings.state import State
 from contactopt.readings.validity import validity
 from contactopt.scenes.scene import Scene
 
@@ -30,7 +33,8 @@ def summary_of(
     peak = pressure_reading(reduction, solution) if single else None
     more = [] if peak is None or not solution.solved else smoothed(peak, largest)
     limits, beyond = validity(reduction, solution)
-    known = doubts(scene, reduction.couplings, reduction.planes, states)
+    force = partial(bears, State(reduction, solution))
+    known = doubts(scene, reduction.couplings, reduction.planes, states, force)
     said = [*known, *remarks(reduction, solution), *beyond]
     return {
         "scene": scene.name,
