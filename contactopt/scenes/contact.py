@@ -40,7 +40,8 @@ class Contact:
 
     upper: str
     lower: str
-    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] | None = None
+    # no number stands for a law without friction, and is 0 once the contact is made
+    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] = None  # type: ignore
     law: str = "coulomb"
     coupling: str = "auto"
     carrier: str | None = None
