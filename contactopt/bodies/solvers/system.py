@@ -15,6 +15,7 @@ from contactopt.errors import InputError
 from contactopt.linear.operators import COLUMNS, Product
 
 Act = Callable[[np.ndarray], np.ndarray]
+INDEFINITE = "the stiffness is not positive definite"  # in what a solver raises where it is not
 
 
 @dataclass(frozen=True, eq=False)
