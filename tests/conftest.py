@@ -3,6 +3,7 @@
 import os
 import re
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,6 +111,18 @@ def punch() -> InterfaceProblem:
 @pytest.fixture(scope="session")
 def cube() -> InterfaceProblem:
     return reduce(scenes.flat_punch(3, elements=4))
+
+
+@pytest.fixture(scope="session")
+def campaign(tmp_path_factory) -> Path:
+    """The folder of a small campaign, with its report."""
+    from contactopt.cli import main
+    from tests.test_benchmark import SMALL, written
+
+    folder = tmp_path_factory.mktemp("campaign")
+    path, out = written(folder, SMALL), folder / "out"
+    assert main(["bench", str(path), "--out", str(out), "--jobs", "2", "-q"]) == 0
+    return out
 
 
 @pytest.fixture

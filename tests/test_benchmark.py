@@ -91,9 +91,8 @@ def written(folder: Path, text: str, name: str = "experiment.toml") -> Path:
 
 
 def run(folder: Path, text: str, **options):
-    return benchmark.load(
-        benchmark.run_campaign(written(folder, text), folder / "out", jobs=2, quiet=True, **options)
-    )
+    path, options = written(folder, text), {"jobs": 1, "quiet": True} | options
+    return benchmark.load(benchmark.run_campaign(path, folder / "out", **options))
 
 
 def bench(path: Path, out: Path, *more: str, jobs: int = 2) -> list[str]:
@@ -102,15 +101,8 @@ def bench(path: Path, out: Path, *more: str, jobs: int = 2) -> list[str]:
     return [*command, "--jobs", str(jobs), *more]
 
 
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    """The folder of a small campaign, and its table."""
-    folder = tmp_path_factory.mktemp("small")
-    return folder, run(folder, SMALL)
-
-
 def test_every_run_is_a_row_with_every_column(campaign):
-    _, table = campaign
+    table = benchmark.load(campaign)
     assert len(table) == 3 * 2 * 2 and table["key"].is_unique
     assert list(table.columns[: len(COLUMNS)]) == list(COLUMNS)
     assert set(table["status"]) == {"solved"} and table["success"].all()
@@ -132,8 +124,8 @@ def test_every_run_is_a_row_with_every_column(campaign):
 
 
 def test_tables_survive_parquet_and_csv(campaign, tmp_path):
-    folder, table = campaign
-    folder = shutil.copytree(folder / "out", tmp_path / "out")
+    folder = shutil.copytree(campaign, tmp_path / "out")
+    table = benchmark.load(folder)
     for name in ("rows.parquet", "rows.csv"):
         if name == "rows.csv":
             benchmark.save(table, folder / name)
@@ -269,8 +261,11 @@ def test_workers_die_with_their_campaign(tmp_path):
     raise AssertionError("the worker outlived its campaign")
 
 
-def test_a_campaign_needs_resume_to_go_on_and_one_writer(tmp_path):
-    run(tmp_path, SMALL, filters=["method=auto"])
+def test_a_campaign_needs_resume_to_go_on_and_one_writer(campaign, tmp_path):
+    out = shutil.copytree(campaign, tmp_path / "out")
+    (out / "rows.parquet").unlink()
+    rows = (out / "rows.jsonl").read_text().splitlines(keepends=True)
+    (out / "rows.jsonl").write_text("".join(rows[:-1]))
     with pytest.raises(InputError, match="--resume"):
         run(tmp_path, SMALL)
     with Store(tmp_path / "out", resume=True), pytest.raises(InputError, match="another campaign"):
@@ -325,16 +320,7 @@ def test_errors_name_the_line(tmp_path, old, new, line, words):
 def test_the_command_line(tmp_path, capsys):
     pytest.importorskip("pandas")
     path = written(tmp_path, SMALL)
-    arguments = [
-        "bench",
-        str(path),
-        "--out",
-        str(tmp_path / "out"),
-        "--jobs",
-        "1",
-        "--filter",
-        "problem=rigid*",
-    ]
+    arguments = f"bench {path} --out {tmp_path / 'out'} --jobs 1 --filter problem=rigid*".split()
     assert main(arguments) == 0
     assert "4 runs: 4 solved" in capsys.readouterr().out
     assert main(arguments) == 2 and "--resume" in capsys.readouterr().err
@@ -359,7 +345,8 @@ def fixed_point(problem, tol=1e-8, steps=20000):
     assert len(mine.strip().splitlines()) < 20
     written(tmp_path, mine, "mine.py")
     text = SMALL.replace('scene = "punch-2d"', 'family = "tangential"\nof = "punch-2d"')
-    table = run(tmp_path, 'plugins = ["mine.py"]' + text.replace('"nsgs"', '"fixed_point"'))
+    text = 'plugins = ["mine.py"]' + text.replace('"nsgs"', '"fixed_point"')
+    table = run(tmp_path, text, filters=["problem=tangential*"])
     ours, theirs = (
         table[(table["name"] == name) & (table["dim"] == 2)] for name in ("auto", "fixed_point")
     )
@@ -419,8 +406,9 @@ def test_entry_points(tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text("[contactopt.methods]\ntheirs = theirs:theirs\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    table = run(tmp_path, SMALL.replace('["auto", "nsgs"]', '"theirs"'))
-    assert len(table) == 6 and set(table["status"]) == {"solved"}
+    text = SMALL.replace('["auto", "nsgs"]', '"theirs"')
+    table = run(tmp_path, text, filters=["problem=rigid*"])
+    assert len(table) == 2 and set(table["status"]) == {"solved"}
 
 
 @pytest.mark.slow

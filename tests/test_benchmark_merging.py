@@ -11,17 +11,9 @@ from contactopt import InputError
 from contactopt.benchmark.merging import joined
 from contactopt.benchmark.ranking import factors, leader_table, points
 from contactopt.benchmark.store import ANSWERS, answers, load, save
-from tests.test_benchmark import SMALL, run
 from tests.test_ranking import rows
 
 pd = pytest.importorskip("pandas")
-
-
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("campaign")
-    run(folder, SMALL)
-    return folder / "out"
 
 
 def theirs(campaign, folder, changed=lambda table: table, answered=lambda found: found):

@@ -12,18 +12,9 @@ from contactopt.benchmark.ranking import points, ranking
 from contactopt.benchmark.report_page import refusals, report_campaign
 from contactopt.benchmark.store import load, save
 from contactopt.cli import main
-from tests.test_benchmark import SMALL, written
 from tests.test_page import data_of
 
 pd = pytest.importorskip("pandas")
-
-
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("campaign")
-    out = folder / "out"
-    assert main(["bench", str(written(folder, SMALL)), "--out", str(out), "--jobs", "1", "-q"]) == 0
-    return out
 
 
 def test_a_campaign_ends_with_a_page_of_all_its_runs(campaign):

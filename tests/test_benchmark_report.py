@@ -318,7 +318,7 @@ def test_findings_say_what_the_table_lacks(path):
     layout = read_layout(path)
     table, lacking = benchmark.load(REPORTS / layout.name), 0
     for column in {"setting", "name", "family", "success"} & {*table}:
-        for value in table[column].unique()[:2]:
+        for value in table[column].unique()[:1]:
             rows = table[table[column] == value]
             own = [name for name in rows if "." in name and rows[name].isna().all()]
             found = made_reports._findings(layout, rows.drop(columns=own))
@@ -390,19 +390,9 @@ def test_the_axis_of_a_profile_is_called_a_ratio():
 
 
 def test_an_experiment_without_figures_gets_the_usual_ones_and_an_optional_one_may_be_missing(
-    tmp_path,
+    campaign, tmp_path
 ):
-    main(
-        [
-            "bench",
-            str(written(tmp_path, SMALL)),
-            "--out",
-            str(tmp_path / "out"),
-            "--jobs",
-            "1",
-            "-q",
-        ]
-    )
+    shutil.copytree(campaign, tmp_path / "out")
     text = (tmp_path / "out" / "report.md").read_text()
     assert text.count("*Table ") == 3 and text.count("*Figure ") == 2
     extra = (

@@ -42,7 +42,7 @@ def in_units(p, force, length):
 @pytest.mark.parametrize("name", NOT_SOLVABLE)
 def test_a_problem_without_a_solution_ends_infeasible_in_all_units(name, force, length, method):
     problem = in_units(NOT_SOLVABLE[name], force, length)
-    solution = solve(problem, method, max_iterations=100, time_limit=5)
+    solution = solve(problem, method, max_iterations=100, time_limit=1)
     assert solution.status is Status.INFEASIBLE and "no solution" in solution.message
     ray = solution.proof
     e = np.zeros(problem.q.shape)

@@ -168,7 +168,7 @@ def test_four_bodies_at_a_point_bear_a_uniform_stress(cells, kinds, laws, degree
     "laws", [("tied",) * 3, ("tied", "tied", "frictionless"), ("coulomb", "tied", "tied")]
 )
 @pytest.mark.parametrize(
-    ("cells", "degree"), [((2,) * 8, 1), ((2, 3, 2, 3, 3, 2, 3, 2), 1), ((2,) * 8, 2)]
+    ("cells", "degree"), [((2,) * 8, 1), ((1, 2, 1, 2, 2, 1, 2, 1), 1), ((1,) * 8, 2)]
 )
 def test_eight_bodies_at_a_point_bear_a_uniform_stress(cells, degree, laws):
     scene, stress = quarters(cells, laws, 3, degree)
@@ -294,7 +294,7 @@ def test_four_blocks_in_space_on_a_rough_floor(cells, degree):
 @pytest.mark.parametrize("degree", [1, 2])
 def test_what_is_left_of_a_seam_passes_the_patch_test(degree):
     flat = [seam((4, 4)), seam((4, 5)), seam((5, 4), kinds=("tri", "quad"), slant=0.3)]
-    spaces = [four_on_floor((2,) * 4), four_on_floor((2, 3, 3, 2))]
+    spaces = [four_on_floor((1,) * 4), four_on_floor((1, 2, 2, 1))]
     for scene in [*flat, *spaces, quarters((2, 3, 2, 3), ("tied", "tied"))[0]]:
         made = posed(replace(scene, degree=degree))
         bodies = {body.name: body for body in made.bodies}

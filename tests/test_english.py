@@ -66,6 +66,12 @@ CALQUES = (
     r"\b(?:bound|deck|FCLib) knows\b",
     r"\botherwise than expected\b",
     r"\bfrom the least on\b",
+    r"\bat a certificate of\b",
+    r"\bknows? more of\b",
+    r"\bmap leads out\b",
+    r"\berror is taken off\b",
+    r"\bdecides? nothing alone\b",
+    r"\bmesh \w+(?: place)? anew\b",
 )
 FOLDERS = ("contactopt", "experiments")
 KINDS = {".py", ".md", ".toml", ".js", ".html"}

@@ -36,6 +36,7 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.fields import von_mises
+from contactopt.bodies.solvers.superlu import SuperLUSolver
 from contactopt.coupling.matrices import matrices_of, write_matrices
 from contactopt.readings.plausibility import doubts
 
@@ -43,9 +44,9 @@ E, NU = 70.0, 0.3
 BRICK = {2: skfem.MeshQuad, 3: skfem.MeshHex}
 ELEMENTS = {
     (skfem.MeshTri, 1): skfem.ElementTriP1, (skfem.MeshTri, 2): skfem.ElementTriP2,
-    (skfem.MeshQuad, 1): skfem.ElementQuad1, (skfem.MeshTet, 1): skfem.ElementTetP1,
-    (skfem.MeshTet, 2): skfem.ElementTetP2, (skfem.MeshHex, 1): skfem.ElementHex1,
-    (skfem.MeshHex, 2): skfem.ElementHex2,
+    (skfem.MeshQuad, 1): skfem.ElementQuad1, (skfem.MeshQuad, 2): skfem.ElementQuad2,
+    (skfem.MeshTet, 1): skfem.ElementTetP1, (skfem.MeshTet, 2): skfem.ElementTetP2,
+    (skfem.MeshHex, 1): skfem.ElementHex1, (skfem.MeshHex, 2): skfem.ElementHex2,
 }  # fmt: skip
 
 
@@ -119,7 +120,8 @@ def compared(one, other):
 
 
 CASES = [
-    (2, skfem.MeshTri, 1), (2, skfem.MeshQuad, 1), (2, skfem.MeshTri, 2), (3, skfem.MeshTet, 1),
+    (2, skfem.MeshTri, 1), (2, skfem.MeshQuad, 1), (2, skfem.MeshTri, 2),
+    (2, skfem.MeshQuad, 2), (3, skfem.MeshTet, 1),
     (3, skfem.MeshHex, 1), (3, skfem.MeshTet, 2),
     pytest.param(3, skfem.MeshHex, 2, marks=pytest.mark.slow),
 ]  # fmt: skip
@@ -298,9 +300,11 @@ WRONG = {
     "not square": (lambda a: {"K": a["K"][:-1]}, "K must be square"),
     "empty": (lambda a: {"K": sp.csr_matrix((32, 32))}, "K must be square and not empty"),
     "complex": (lambda a: {"K": a["K"] * 1j}, "K must be real"),
+    "one triangle": (lambda a: {"K": sp.tril(a["K"])}, "one side of its diagonal only"),
     "nan in K": (lambda a: {"K": a["K"] * np.nan}, "K holds a number that is not finite"),
     "text": (lambda a: {"K": "K.mtx"}, "must be an array of numbers"),
     "f of another size": (lambda a: {"f": a["f"][:-2]}, "f needs 32 numbers"),
+    "f by nodes": (lambda a: {"f": a["f"].reshape(16, 2)}, "in one row, as K has rows"),
     "f not finite": (lambda a: {"f": a["f"] + np.inf}, "loads f of body 'bed' holds"),
     "K of fewer points": (
         lambda a: {"K": a["K"][:-2, :-2], "f": a["f"][:-2], "fixed": [0, 1, 2]},
@@ -328,8 +332,12 @@ WRONG = {
         "held in all its components",
     ),
     "all fixed": (lambda a: {"fixed": np.arange(32)}, "held"),
+    "a mask": (lambda a: {"fixed": np.arange(32) < 8}, "of a mask give numpy.flatnonzero"),
+    "nothing is held": (lambda a: {"fixed": None}, "hold one of them by a support"),
     "fixed beyond": (lambda a: {"fixed": [99]}, "from 0 to 31; got 99"),
-    "penalty": (lambda a: {"K": added(a["K"], 0, 0, 1e30), "fixed": None}, "by penalty"),
+    "penalty": (
+        lambda a: {"K": added(a["K"], 0, 0, 1e30), "fixed": None}, "and 1 such unknowns in all"
+    ),
     "rows left as ones": (
         lambda a: {"K": isolated(a["K"], 0), "fixed": a["fixed"][a["fixed"] != 0]},
         "which is what a boundary condition leaves there",
@@ -372,6 +380,21 @@ def test_input_that_lies_is_found(name):
     with pytest.raises(InputError, match=said.replace("(", r"\(")) as caught:
         solved_on(**{**base, **change(base)})
     assert str(caught.value).endswith(".") and str(caught.value).count(". ") == 0
+
+
+def test_factors_that_are_there_prove_that_a_stiffness_is_definite(monkeypatch):
+    """Two solves then find motions without stiffness, in place of twelve; the third is the load."""
+    count = []
+    solve_with = SuperLUSolver.solve
+    monkeypatch.setattr(
+        SuperLUSolver, "solve", lambda self, *a: count.append(1) or solve_with(self, *a)
+    )
+    punch = Rigid("punch", force={"y": -1.0}, gap=lambda x: x[0] ** 2)
+    scene = Scene("by matrices", punch, MatrixPart("bed", **given()), 0.3)
+    for Q, most in (("explicit", 3), ("implicit", 14)):
+        count.clear()
+        reduce_bodies(scene, Q=Q, solver="superlu")
+        assert len(count) <= most
 
 
 UNITS = {

@@ -62,7 +62,7 @@ def test_a_time_limit_stops_a_run_and_resume_ends_it(tmp_path, capsys, monkeypat
     for content in (b"PK", b"", b"no archive"):
         (tmp_path / FILE).write_bytes(content)
         assert main([*line, "--start", "."]) == 2
-        assert "is damaged; run the scene anew" in capsys.readouterr().err
+        assert "is damaged; run the scene again" in capsys.readouterr().err
     assert main([*line, "--resume", "--start", "out/cattaneo-2d"]) == 2
     assert "exclude each other" in capsys.readouterr().err
 

@@ -5,12 +5,14 @@ everywhere.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from contactopt.accuracy.estimate import Judged, read
 from contactopt.accuracy.everywhere import SAFETY, best_order, mesh_error, safety, stuck
+from contactopt.accuracy.first_mesh import seeing, unseen
 from contactopt.accuracy.indicators import ElementErrors, along_path, misfit
 from contactopt.accuracy.marking import (
     at_contacts,
@@ -52,12 +54,20 @@ class Locally:
         check_refinable(states[-1])
         made = [divisible(scene, not whole) for scene in states]
         self.states, self.shapes = [scene for scene, _ in made], made[-1][1]
+        self.across, self.unseen = 1.0, {} if whole else unseen(states[-1])
+        self._see()
         self.quantity, self.options, self.whole, self.watches = quantity, options, whole, not whole
         self.best = best_order(quantity.name, states[-1].degree)
         self.values: list[float] = []
         self.errors: list[ElementErrors] = []
         self.last: Solved | None = None
         self.splits = 0
+
+    def _see(self) -> None:
+        """Divide elements at contacts that are too small for the first mesh."""
+        if self.unseen:
+            see = partial(seeing, contacts=self.unseen, across=self.across, shapes=self.shapes)
+            self.states = [see(scene) for scene in self.states]
 
     def solve(self) -> Solved:
         return self._solved([with_bent_edges(scene, self.shapes) for scene in self.states])
@@ -96,7 +106,8 @@ class Locally:
 
     @property
     def ready(self) -> bool:
-        return len(self.values) > 2
+        """Three meshes tell whether values converge, two where the first was made for contact."""
+        return len(self.values) > (1 if self.unseen else 2)
 
     def facts(self, solved: Solved) -> dict[str, Any]:
         if not self.whole:
@@ -130,6 +141,9 @@ class Locally:
                 for i, own in enumerate(marks)
             )
         self.states = [finer(scene, marked, self.shapes) for scene in self.states]
+        if reading.uncertainty > judged.size / 3:
+            self.across *= 2
+            self._see()
         return float(unknowns(self.states[-1]))
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:

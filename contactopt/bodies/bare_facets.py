@@ -2,7 +2,8 @@
 
 Each facet gets an element of its own behind it, which lends its shape functions, its normals and
 its quadrature to the trace of the displacement (contactopt.bodies.elements). Its other nodes belong
-to nobody and have no weight. Facets of three nodes in the plane count as those of triangles.
+to nobody and have no weight. Facets of three nodes in the plane are those of quadrilaterals where
+the stiffness says so, else of triangles.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ KINDS = {
     (2, 2): ("RefTri", 2), (2, 3): ("RefTri", 2), (3, 3): ("RefTet", 3), (3, 4): ("RefHex", 4),
     (3, 6): ("RefTet", 3), (3, 8): ("RefHex", 4), (3, 9): ("RefHex", 4),
 }  # fmt: skip
+OF_TRIANGLE = 6  # nodes of one of second order, with which K couples the middle of an edge
 BESIDE = 0.25  # of an edge: how far a node in the middle may lie from it
 DEPTH = 0.5  # of the size of a facet: how deep the element behind it is
 
@@ -136,23 +138,32 @@ def turned_outwards(
 
 
 def bare_surface(
-    points: np.ndarray, facets: np.ndarray, outward: np.ndarray, weight: Weight, every: bool
+    points: np.ndarray,
+    facets: np.ndarray,
+    outward: np.ndarray,
+    weight: Weight,
+    every: bool,
+    coupled: sp.csr_matrix | None,
 ) -> BareSurface:
-    """The trace of the displacement on facets (f, j) with outward normals (dim, f); arguments as of
-    contactopt.bodies.elements.contact_trace.
+    """The trace of the displacement on facets (f, j) with outward normals (dim, f); `coupled` as of
+    turned_outwards, other arguments as of contactopt.bodies.elements.contact_trace.
     """
     dim, (kind, corners) = len(points), KINDS[len(points), facets.shape[1]]
+    if (dim, facets.shape[1]) == (2, 3) and coupled is not None:
+        many = np.median(np.diff(coupled.indptr)[facets[:, 2]]) > OF_TRIANGLE
+        kind = "RefQuad" if many else kind
     degree = 1 if facets.shape[1] == corners else 2
     known, ends = np.unique(facets[:, :corners], return_inverse=True)
     ends = ends.reshape(len(facets), corners)
     x, count = points[:, known], len(known)
     at = x[:, ends]
     depth = DEPTH * np.linalg.norm(at[..., 1] - at[..., 0], axis=0) * outward
-    if kind == "RefHex":
+    if kind in ("RefHex", "RefQuad"):
         behind = (at - depth[..., None]).reshape(dim, -1)
-        added = count + np.arange(behind.shape[1]).reshape(len(facets), 4)
-        # skfem's order: a corner, its three neighbours, the three opposite these, the last one
-        t = np.concatenate([ends, added], axis=1)[:, [0, 1, 3, 4, 2, 5, 7, 6]].T
+        added = count + np.arange(behind.shape[1]).reshape(len(facets), corners)
+        # skfem's order: cyclic; or a corner, its three neighbours, those opposite them, the last
+        order = [0, 1, 3, 2] if kind == "RefQuad" else [0, 1, 3, 4, 2, 5, 7, 6]
+        t = np.concatenate([ends, added], axis=1)[:, order].T
     else:
         behind = at.mean(axis=2) - depth
         t = np.concatenate([ends, count + np.arange(len(facets))[:, None]], axis=1).T

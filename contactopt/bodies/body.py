@@ -109,7 +109,7 @@ def reload_body(body: Assembly, scene: Scene, part: Part) -> Assembly:
     if not held or not np.array_equal(fixed.motion, body.motion):
         raise InputError(
             f"body '{part.name}': supports or plates hold other unknowns than before; reduce it"
-            " anew."
+            " again."
         )
     return replace(
         body,
@@ -148,14 +148,14 @@ def check_mesh(scene: Scene, part: Part, mesh: skfem.Mesh) -> None:
         place = place_words(middle)
         raise InputError(
             f"body '{part.name}': tetrahedra split a quadrilateral along different diagonals, at"
-            f" ({place}), and share no side there; mesh this place anew."
+            f" ({place}), and share no side there; mesh this place again."
         )
     _check_pieces(part, mesh)
     if (over := overlapping(mesh)) is not None:
         place = place_words(mesh.p[:, mesh.t[:, over]].mean(axis=1))
         raise InputError(
             f"body '{part.name}': an element of the mesh lies over its neighbour, at ({place});"
-            " move its nodes apart, or mesh this place anew."
+            " move its nodes apart, or mesh this place again."
         )
     if scene.analysis.revolved and mesh.p[0].min() < -1e-12 * np.ptp(mesh.p[0]):
         raise InputError(

@@ -204,6 +204,11 @@ def _held(
     made = Constraints(scene, part, numbers, part.facets, _nodes_of(part), *none)
     follows, fixed = _follows(D), {} if part.fixed is None else part.fixed
     if not isinstance(fixed, Mapping):
+        if np.asarray(fixed).dtype == bool:
+            raise InputError(
+                f"body '{part.name}': fixed names unknowns by their numbers; of a mask give"
+                " numpy.flatnonzero(mask)."
+            )
         fixed = dict.fromkeys(np.ravel(fixed).tolist(), 0.0)
     where = real_array(f"the fixed unknowns of body '{part.name}'", list(fixed))
     values = real_array(f"the fixed displacements of body '{part.name}'", list(fixed.values()))
@@ -306,7 +311,7 @@ def _surface(
     tied = bool(laws) and not any(law.bounded for law in laws)
     weight = (scene.analysis.measure(scene.thickness) * scene.copies, scene.analysis.revolved)
     try:
-        made = bare_surface(at.x, facets, outward, weight, tied)
+        made = bare_surface(at.x, facets, outward, weight, tied, coupled)
     except InputError as error:
         raise InputError(f"{what}: {error}") from None
     trace, point = made.trace, made.nodes

@@ -24,6 +24,7 @@ from contactopt.scenes.matrix_part import MatrixPart
 BALANCED = 1e-7  # sum of the forces of a rigid motion over their sizes: below it, it is rounding
 PIVOT = 1e-13  # of the largest eigenvalue: one below it belongs to a motion without stiffness
 STEPS = 12  # of Lanczos's method
+FEW = 2  # of its steps find a motion without stiffness, which the first one makes large
 SAME = 1e-8  # x' K^-1 y and y' K^-1 x of a function that solves may differ by this fraction
 
 
@@ -186,8 +187,9 @@ def check_definite(body: Matrices, made: ElasticBody, known: bool) -> None:
         return
     K = body.A[kept][:, kept]
     d = np.sqrt(K.diagonal())  # scaled by it, small elements and large ones count alike
-    low, high = _extremes(lambda x: np.asarray(K @ (x / d)) / d, start)
-    softest = _extremes(lambda x: d * solve(d * x), start)
+    steps = FEW if made.solver.definite else STEPS
+    low, high = _extremes(lambda x: np.asarray(K @ (x / d)) / d, start, STEPS)
+    softest = _extremes(lambda x: d * solve(d * x), start, steps)
     if min(low, 0.0) < -PIVOT * high or softest[0] < -SAME * softest[1]:
         raise InputError(
             f"body '{body.name}': K is not positive semidefinite, since {low:.3g} is among its"
@@ -198,11 +200,11 @@ def check_definite(body: Matrices, made: ElasticBody, known: bool) -> None:
         raise without_stiffness(body)
 
 
-def _extremes(act: Act, x: np.ndarray) -> tuple[float, float]:
-    """The least and the largest Ritz value of a symmetric matrix after STEPS steps from x (n,)."""
+def _extremes(act: Act, x: np.ndarray, steps: int) -> tuple[float, float]:
+    """The least and the largest Ritz value of a symmetric matrix after some steps from x (n,)."""
     basis = [x / np.linalg.norm(x)]
     moved: list[np.ndarray] = []
-    while len(moved) < min(STEPS, len(x)):
+    while len(moved) < min(steps, len(x)):
         moved.append(act(basis[-1]))
         if not np.isfinite(moved[-1]).all():
             return 0.0, np.inf

@@ -4,15 +4,19 @@ interface problem once Q is known.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
-from typing import NamedTuple
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from contactopt.bodies import assemble
 from contactopt.bodies.assembled import AssembledBody
-from contactopt.bodies.protocol import Body
+from contactopt.bodies.assembled_elastic import AssembledElastic
+from contactopt.bodies.motions import kernel, whole_motions, work
+from contactopt.bodies.protocol import Body, FreeMotions
 from contactopt.checks import check_count, check_number
 from contactopt.coupling.bolts import check_bolts
 from contactopt.coupling.coupling import Coupling, couple, law_of, tested
@@ -34,6 +38,7 @@ class Posed(NamedTuple):
     couplings: tuple[Coupling, ...]
     maps: tuple[sp.csr_matrix, ...]
     planes: tuple[SymmetryPlane, ...]
+    seconds: float = 0.0  # that this took
 
 
 def posed(
@@ -46,6 +51,7 @@ def posed(
     """Assemble the bodies of a scene and couple their surfaces; the arguments are as for reduce(),
     and so are the errors.
     """
+    begin = time.perf_counter()
     elements, zone = _checked(scene, elements, zone, Q)
     assembled = tuple(each(lambda part: assemble(scene, part, elements, zone), scene.parts))
     check_bolts(scene, assembled)
@@ -64,7 +70,7 @@ def posed(
         cutting = [plane for made in couplings for plane in made.planes]
         guides = [own for body in assembled if (own := body.guides()) is not None]
         planes = tuple(mirror_planes(scene, guides, cutting))
-    return Posed(assembled, couplings, maps, planes)
+    return Posed(assembled, couplings, maps, planes, time.perf_counter() - begin)
 
 
 def _checked(
@@ -126,3 +132,32 @@ def problem_of(
     # what each multiplier is, for messages
     names = tuple(f"body '{body.name}': {name}" for body in bodies for name in body.motions.names)
     return InterfaceProblem(Q, q, law, V, s, areas, points, chart, pairs, names)
+
+
+def free_problem(scene: Scene, made: Posed) -> InterfaceProblem:
+    """The rigid motions of all bodies that supports and plates leave free; Q means
+    nothing."""
+    bodies: list[Any] = [
+        _free_body(scene, body) if isinstance(body, AssembledElastic) else body
+        for body in made.bodies
+    ]
+    Q = sp.identity(made.maps[0].shape[0], format="csr")
+    return problem_of(scene, Q, bodies, made.maps, made.couplings)
+
+
+def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
+    """The rigid motions (n, m) of an elastic body that leave supports at rest and plates level, and
+    the resultants (m,) of its loads in them.
+    """
+    body = assembled.body
+    R, labels = whole_motions(scene.analysis, body.basis)
+    mean = body.motion.T / np.maximum(body.motion.sum(axis=0), 1.0)[:, None]
+    held = np.ones(len(R), dtype=bool)
+    held[body.free] = False
+    combined, names = kernel((R - body.motion @ (mean @ R))[held], labels)
+    Z = R @ combined
+    return SimpleNamespace(
+        name=body.name,
+        at_rest=np.zeros(len(R)),
+        motions=FreeMotions(Z, tuple(names), work(Z, body.load) + (mean @ Z).T @ body.plate_forces),
+    )

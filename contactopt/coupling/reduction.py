@@ -37,7 +37,7 @@ from contactopt.coupling.compliance import compliance, filling, operator
 from contactopt.coupling.costs import FORM_OF, estimates, next_best
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
-from contactopt.coupling.posed import posed, problem_of
+from contactopt.coupling.posed import Posed, posed, problem_of
 from contactopt.coupling.same_scene import check_same
 from contactopt.errors import InputError
 from contactopt.linear.budget import fill
@@ -260,6 +260,7 @@ def reduce_bodies(
     solver: str = "auto",
     coupling: str | None = None,
     once: bool = True,
+    made: Posed | None = None,
 ) -> Reduction:
     """Reduce a scene to its interface problem and keep the bodies, from which fields are recovered.
 
@@ -270,6 +271,7 @@ def reduce_bodies(
     scene, elements, zone, Q, solver, coupling : As for reduce(), which raises the same errors.
     once : Whether only one problem is solved, by Newton's method. If not, factors of the bodies are
         used again, and multigrid is taken only where it costs much less.
+    made : The scene before anything is factorised, where it is known.
 
     Returns
     -------
@@ -279,9 +281,9 @@ def reduce_bodies(
     ------
     TooDear : Where a budget of work is open (contactopt.linear.budget) and too low.
     """
-    start = time.perf_counter()
-    assembled, couplings, maps, planes = posed(scene, elements, zone, Q, coupling)
-    times = [start, time.perf_counter()]
+    made = made or posed(scene, elements, zone, Q, coupling)
+    assembled, couplings, maps, planes, spent = made
+    times = [time.perf_counter()]
 
     Q, solver = _way(scene, assembled, maps, (Q, solver), once)
     iterate = any(body.iterates(solver) for body in assembled)
@@ -294,15 +296,15 @@ def reduce_bodies(
         give_back()
     times.append(time.perf_counter())
 
-    made = compliance(bodies, maps, couplings, implicit)
-    size = diagonal(made)
+    form = compliance(bodies, maps, couplings, implicit)
+    size = diagonal(form)
     on_ground = not np.min(size, initial=0.0) >= -NOISE * np.max(size, initial=0.0)
     if on_ground:  # nothing is left of the compliance of a thin body but rounding, or no number
         bodies = _on_ground(scene, bodies)
-        made = compliance(bodies, maps, couplings, implicit)
-    problem = problem_of(scene, made, bodies, maps, couplings)
+        form = compliance(bodies, maps, couplings, implicit)
+    problem = problem_of(scene, form, bodies, maps, couplings)
     times.append(time.perf_counter())
-    seconds = dict(zip(("assemble", "factorise", "compliance"), np.diff(times).tolist()))
+    seconds = dict(zip(("assemble", "factorise", "compliance"), [spent, *np.diff(times).tolist()]))
     return Reduction(scene, problem, bodies, maps, couplings, seconds, planes, on_ground)
 
 

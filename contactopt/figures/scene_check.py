@@ -6,23 +6,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy.sparse as sp
 
 from contactopt.accuracy.proposal import accuracy_lines
 from contactopt.bodies.assembled_elastic import AssembledElastic
-from contactopt.bodies.motions import kernel, whole_motions, work
-from contactopt.bodies.protocol import FreeMotions
 from contactopt.bodies.solvers import solvers_there
 from contactopt.cards import count
 from contactopt.checks import overheard
 from contactopt.coupling.compliance import filling
 from contactopt.coupling.costs import FORM_OF, estimates
 from contactopt.coupling.coupling import Coupling
-from contactopt.coupling.posed import Posed, posed, problem_of
+from contactopt.coupling.posed import Posed, free_problem, posed
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.figures.sheet import part_lines
@@ -82,7 +78,7 @@ def check_scene(
     scene, options = states[-1], solve or {}
     with overheard() as heard:
         made = posed(scene)
-    free = _free_problem(scene, made)
+    free = free_problem(scene, made)
     once = len(states) == 1 and options.get("method") in STEPS
     costs, memory = _costs(scene, made, options, once)
     coupled = [text for own in made.couplings for text in own.remarks]
@@ -119,34 +115,6 @@ def check_scene(
     return SceneCheck(scene, made, free, costs, memory, tuple(notes), "\n".join(lines))
 
 
-def _free_problem(scene: Scene, made: Posed) -> InterfaceProblem:
-    """The rigid motions of all bodies that supports and plates leave free."""
-    bodies: list[Any] = [
-        _free_body(scene, body) if isinstance(body, AssembledElastic) else body
-        for body in made.bodies
-    ]
-    Q = sp.identity(made.maps[0].shape[0], format="csr")
-    return problem_of(scene, Q, bodies, made.maps, made.couplings)
-
-
-def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
-    """The rigid motions (n, m) of an elastic body that leave supports at rest and plates level, and
-    the resultants (m,) of its loads in them.
-    """
-    body = assembled.body
-    R, labels = whole_motions(scene.analysis, body.basis)
-    mean = body.motion.T / np.maximum(body.motion.sum(axis=0), 1.0)[:, None]
-    held = np.ones(len(R), dtype=bool)
-    held[body.free] = False
-    combined, names = kernel((R - body.motion @ (mean @ R))[held], labels)
-    Z = R @ combined
-    return SimpleNamespace(
-        name=body.name,
-        at_rest=np.zeros(len(R)),
-        motions=FreeMotions(Z, tuple(names), work(Z, body.load) + (mean @ Z).T @ body.plate_forces),
-    )
-
-
 def _held(part: AnyPart, name: str, free: InterfaceProblem) -> str:
     """What holds a body."""
     start = f"body '{name}': "
@@ -167,7 +135,7 @@ def _balance(states: Sequence[Scene], made: Posed, free: InterfaceProblem) -> li
     """Loads that no contact forces can balance, and motions that nothing resists."""
     found = []
     for number, state in enumerate(states, 1):
-        problem = free if state is states[-1] else _free_problem(state, _posed_again(state, made))
+        problem = free if state is states[-1] else free_problem(state, _posed_again(state, made))
         if (gone := escape(problem)) is not None:
             where = f"in state {number} " if len(states) > 1 else ""
             found.append(where + sentence(problem, gone))

@@ -19,7 +19,7 @@ Geometric Design 22.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -284,13 +284,14 @@ class _Patches:
         self.planes = skin.planes[:, :, mine]
         self.rims = _in_planes(self.off, self.planes)
         self.region, self.shapes, self.near = skin.region[mine], skin.shapes, skin.near
+        self.frames = frames_of(self.corners)
         self.tree = cKDTree(self.corners.mean(axis=1).T)
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
         """The places (3, m) of points near the triangles."""
         count = min(NEAREST, len(self.region))
         near = self.tree.query(points.T, k=count)[1].reshape(points.shape[1], count)
-        outside = barycentric(self.corners[:, :, near], points)[1]
+        outside = barycentric(self.frames, near, points)[1]
         order = np.argsort(outside + PREFER * (self.region[near] < 0), axis=1)
         ranked = np.take_along_axis(near, order, axis=1).T
         found, within = self._on(points, ranked[0])
@@ -331,14 +332,14 @@ class _Patches:
 
     def _on_patch(self, points: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The places of points on the patches of chosen triangles, and whether these have them."""
-        corners, bulge = self.corners[:, :, chosen], np.zeros_like(points)
+        off, bulge = self.off[:, :, chosen], np.zeros_like(points)
         for _ in range(FOOTS):
-            weights = barycentric(corners[..., None], points - bulge)[0][:, 0].T
+            weights = barycentric(self.frames, chosen, points - bulge)[0]
             share = np.clip(weights, 0, 1)
             share = share / share.sum(axis=0)
-            both = share * np.roll(share, -1, axis=0)
-            bulge = 4 * np.einsum("iet,et->it", self.off[:, :, chosen], both)
-        return np.einsum("ict,ct->it", corners, share) + bulge, np.all(weights >= 0, axis=0)
+            bulge = 4 * np.sum(off * (share * np.roll(share, -1, axis=0)), axis=1)
+        place = np.sum(self.corners[:, :, chosen] * share, axis=1)
+        return place + bulge, np.all(weights >= 0, axis=0)
 
     def _on_rim(self, edge: int, points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Points in the plane beyond an edge of the chosen triangles, on the curve of that edge."""
@@ -368,17 +369,48 @@ def _in_plane(
     return np.asarray(found - normal * np.sum((found - points) * normal, axis=0))
 
 
-def barycentric(corners: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where points (dim, m) are beside c edges or triangles each, with corners (dim, dim, m, c).
+class Frames(NamedTuple):
+    """Edges in the plane or triangles in space, prepared for `barycentric`.
 
-    Returns barycentric coordinates (m, c, dim) of the nearest points of the lines or planes, and
-    distances (m, c) over the sizes of the facets.
+    origin  (dim, f) their first corners
+    dual    (dim - 1, dim, f) slopes of the barycentric coordinates of the other corners
+    normal  (dim, f) unit normals over the sizes of the facets
     """
-    origin, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
-    offset = points[:, :, None] - origin
-    gram = np.einsum("iafc,ibfc->fcab", edges, edges)
-    weights = np.linalg.solve(gram, np.einsum("iafc,ifc->fca", edges, offset)[..., None])[..., 0]
-    every = np.concatenate([1 - weights.sum(axis=-1, keepdims=True), weights], axis=-1)
-    height = np.linalg.norm(offset - np.einsum("iafc,fca->ifc", edges, weights), axis=0)
-    size = np.sqrt(np.trace(gram, axis1=2, axis2=3))
-    return every, np.maximum(-every, 0).max(axis=-1) + height / size
+
+    origin: np.ndarray
+    dual: np.ndarray
+    normal: np.ndarray
+
+
+def frames_of(corners: np.ndarray) -> Frames:
+    """Those of facets with corners (dim, dim, f)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    normal, size = area_vectors(corners), np.sqrt(np.sum(edges**2, axis=(0, 1)))
+    normal = normal / np.linalg.norm(normal, axis=0)
+    if len(corners) == 2:
+        dual = edges / size**2
+    else:
+        first, second = edges[:, 0], edges[:, 1]
+        across = np.cross(second, normal, axis=0), np.cross(normal, first, axis=0)
+        content = np.sum(normal * np.cross(first, second, axis=0), axis=0)
+        dual = np.stack(across, axis=1) / content
+    return Frames(corners[:, 0], dual.swapaxes(0, 1), normal / size)
+
+
+def barycentric(
+    frames: Frames, which: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where points (dim, m) are beside the facets `which` (m,) or (m, c).
+
+    Returns barycentric coordinates (dim, m) or (dim, m, c) of the nearest points of the lines or
+    planes, and distances (m,) or (m, c) over the sizes of the facets.
+    """
+    x = points.reshape(*points.shape, *[1] * (which.ndim - 1))
+    offset = [own - first[which] for own, first in zip(x, frames.origin)]
+
+    def along(rows: np.ndarray) -> np.ndarray:
+        return np.asarray(sum(row[which] * own for row, own in zip(rows, offset)))
+
+    others = [along(rows) for rows in frames.dual]
+    every = np.stack([1 - sum(others), *others])
+    return every, np.maximum(-every.min(axis=0), 0) + np.abs(along(frames.normal))

@@ -238,7 +238,7 @@ def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
         raise cells.refused(
             int(np.argmax(np.any(cells.nodes == both[0], axis=0))),
             "a node of {} is a corner of one element and"
-            " within an edge of another; mesh this place anew.",
+            " within an edge of another; mesh this place again.",
         )
     kept = np.concatenate([corners, inner])
     number = np.full(cells.points.shape[1], -1)
@@ -251,7 +251,7 @@ def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
     except (IndexError, ValueError) as error:  # there are not as many nodes as edges
         raise InputError(
             f"mesh file '{cells.path}': neighbouring elements do not share the nodes within their"
-            " edges; mesh it anew."
+            " edges; mesh it again."
         ) from error
     return mesh, number
 

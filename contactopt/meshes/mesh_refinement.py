@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 import skfem
 from scipy.spatial import cKDTree
-from skfem import Mesh
+from skfem import Mesh, MeshTet
 
 from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.errors import InputError
+from contactopt.meshes.bisection import bisected, uncut
 from contactopt.meshes.cells import (
     CURVED,
     area_vectors,
@@ -31,7 +32,7 @@ from contactopt.meshes.cells import (
     volumes,
 )
 from contactopt.meshes.curves import plane_curves
-from contactopt.meshes.facet_surfaces import barycentric, space_curves
+from contactopt.meshes.facet_surfaces import barycentric, frames_of, space_curves
 from contactopt.meshes.given_curves import Curve
 
 log = logging.getLogger(__name__)
@@ -81,6 +82,30 @@ def divide(mesh: Mesh, marked: np.ndarray, curves: Curves) -> Any:
     return _refined(mesh, marked[large], curves)
 
 
+def graded(mesh: Mesh, large: Callable[[np.ndarray], np.ndarray], curves: Curves) -> Any:
+    """Divide the elements whose corners (dim, c, e) are `large`, a function to a mask (e,), and
+    their parts, until none is; the rest as for `divide`.
+    """
+    if not isinstance(mesh, MeshTet):
+        while len(marked := np.flatnonzero(large(mesh.p[:, mesh.t]))):
+            mesh = divide(mesh, marked, curves)
+        return mesh
+    cut, held = uncut(mesh), _present(mesh, curves)
+    members = {name: facets_of(mesh, name) for name in held}
+    while len(marked := np.flatnonzero(large(cut.p[:, cut.t]))):
+        new = bisected(cut, marked)
+        points, fresh = new.p.copy(), np.arange(cut.p.shape[1], new.p.shape[1])
+        for name, curve in held.items():
+            on = np.isin(new.facets, members[name])
+            nodes = [np.delete(new.t, v, axis=0)[:, mine].ravel() for v, mine in enumerate(on)]
+            mine = np.intersect1d(fresh, np.concatenate(nodes))
+            if len(mine):
+                points[:, mine] = curve(points[:, mine])
+        straight_edges = MeshTet(new.p, new.t.astype(np.int32), sort_t=False)
+        cut = new._replace(p=_unfolded(straight_edges, points).p)
+    return cut.mesh(mesh)
+
+
 def split(mesh: Mesh, curves: Curves) -> Any:
     """Halve all elements of a mesh, with new nodes of curved boundaries on their curves, as for
     `divide`.
@@ -96,7 +121,10 @@ def _refined(
     mesh: Mesh, how: int | np.ndarray, curves: Curves, places: np.ndarray | None = None
 ) -> Mesh:
     """The mesh divided as scikit-fem is told, its new nodes at `places`, if any, and on curves."""
-    fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
+    if isinstance(mesh, MeshTet) and not isinstance(how, int):
+        fine = bisected(uncut(mesh), how).mesh(mesh)
+    else:
+        fine = named_like(mesh, replace(mesh, _boundaries=None, _subdomains=None).refined(how))
     new = np.arange(mesh.p.shape[1], fine.p.shape[1])
     points = fine.p.copy() if places is None else places.copy()
     for name, curve in _present(mesh, curves).items():
@@ -223,7 +251,7 @@ def named_like(old: Mesh, new: Mesh) -> Mesh:
     held = cKDTree(centres.T).query_ball_point(middle.T, radius)
     within = np.concatenate([[0][:0], *held]).astype(int)
     of = np.repeat(np.arange(len(facets)), [len(own) for own in held])
-    off = barycentric(corners[:, :, of, None], centres[:, within])[1][:, 0]
+    off = barycentric(frames_of(corners), of, centres[:, within])[1]
     order = np.lexsort((off, within))
     found, first = np.unique(within[order], return_index=True)
     parent = np.full(len(outer), -1)

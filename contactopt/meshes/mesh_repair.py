@@ -175,7 +175,7 @@ def repaired(cells: Cells, merged: np.ndarray) -> Cells:
     sets = np.sort(merged[cells.corners], axis=0)
     flat = np.flatnonzero(np.any(np.diff(sets, axis=0) == 0, axis=0))
     if len(flat):
-        raise cells.refused(flat[0], "two corners coincide in {}; mesh this place anew.")
+        raise cells.refused(flat[0], "two corners coincide in {}; mesh this place again.")
     once = np.sort(np.unique(sets, axis=1, return_index=True)[1])
     if len(once) < sets.shape[1]:
         words = count(sets.shape[1] - len(once), "element is", "elements are")
@@ -218,7 +218,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
         raise cells.refused(
             wrong[0],
             "{} does not share the nodes within its edges and"
-            " faces with its neighbours; mesh this place anew.",
+            " faces with its neighbours; mesh this place again.",
         )
     volume = volumes(mesh)
     size = np.linalg.norm(np.ptp(mesh.p[:, mesh.t], axis=1), axis=0) ** len(mesh.p)
@@ -226,7 +226,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
     if len(bad):
         flat = np.abs(volume[bad[0]]).max() <= FLAT * size[bad[0]]
         how = "has no volume" if flat else "folds over"
-        raise cells.refused(bad[0], f"{{}} {how}; mesh this place anew.")
+        raise cells.refused(bad[0], f"{{}} {how}; mesh this place again.")
     shared = np.bincount(mesh.t2f.ravel())
     if shared.max() > 2:
         raise cells.refused(
@@ -234,7 +234,7 @@ def check_elements(cells: Cells, mesh: skfem.Mesh) -> None:
             "more than two elements share a facet, one of them is {}; elements must not overlap.",
         )
     if (over := overlapping(mesh)) is not None:
-        raise cells.refused(over, "{} lies over its neighbour; mesh this place anew.")
+        raise cells.refused(over, "{} lies over its neighbour; mesh this place again.")
     # the outward normals of a closed surface integrate to zero
     areas = area_vectors(mesh.p[:, outer_corners(mesh, mesh.boundary_facets())])
     total = np.abs(areas.sum(axis=1)).max()

@@ -227,6 +227,15 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
     body, _, motion = _label(problem, found.strongest).rpartition(": ")
     body = body or "a body"
     if found.loose:
+        far = np.abs(found.motion) > EQUAL * np.abs(found.motion).max()
+        labels = [_label(problem, i).rpartition(": ")[0] for i in np.flatnonzero(far).tolist()]
+        together = list(dict.fromkeys(filter(None, labels)))
+        if len(together) > 1:
+            return (
+                "the loads do not balance: neither supports nor contacts hold"
+                f" {' and '.join(together)}, which move together ({motion}); hold one of them by a"
+                " support, or give loads that balance."
+            )
         return (
             f"the loads do not balance: neither supports nor contacts hold {body} ({motion}); add a"
             " support, or loads that balance."

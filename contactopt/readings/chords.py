@@ -36,7 +36,7 @@ from skfem.refdom import RefLine, RefTri
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import is_curved, outer_corners
-from contactopt.meshes.facet_surfaces import barycentric
+from contactopt.meshes.facet_surfaces import barycentric, frames_of
 from contactopt.meshes.mesh_refinement import boundary_curves
 from contactopt.problem import Solution
 
@@ -147,15 +147,15 @@ class Way:
         if len(nodes) == 4:
             nodes = np.concatenate([nodes[[0, 1, 2]], nodes[[0, 2, 3]]], axis=1)
         self.corners, self.angle = mesh.p[:, nodes], np.resize(angle, nodes.shape[1])
+        self.frames = frames_of(self.corners)
         self.curve, self.tree = curve, cKDTree(self.corners.mean(axis=1).T)
 
     def feet(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The places (dim, m) of the facets nearest to points, and the numbers of these facets."""
         count = min(NEAREST, self.corners.shape[2])
         near = self.tree.query(points.T, k=count)[1].reshape(-1, count)
-        share = np.clip(barycentric(self.corners[:, :, near], points)[0], 0, 1)
-        share = share / share.sum(axis=2, keepdims=True)
-        feet = np.einsum("dvmc,mcv->dmc", self.corners[:, :, near], share)
+        share = np.clip(barycentric(self.frames, near, points)[0], 0, 1)
+        feet = np.sum(self.corners[:, :, near] * (share / share.sum(axis=0)), axis=1)
         best = np.argmin(np.linalg.norm(feet - points[:, :, None], axis=0), axis=1)
         return feet[:, np.arange(len(best)), best], near[np.arange(len(best)), best]
 

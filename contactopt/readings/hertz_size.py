@@ -25,14 +25,24 @@ BALANCED = 1e-3  # share of the loads that the forces of the pairs may leave
 
 
 class Hertz(NamedTuple):
-    """What is predicted of a pair: its place (dim,), force, half-widths, the smallest last, and the
-    size of the elements there [length].
+    """What is predicted of a pair: its place (dim,), force, half-widths, the smallest last, the
+    size of the elements there [length], and directions (dim - 1, dim) of the half-widths.
     """
 
     place: np.ndarray
     force: float
     widths: tuple[float, ...]
     size: float
+    axes: np.ndarray
+
+    def away(self, points: np.ndarray) -> np.ndarray:
+        """Distances (m,) of points (dim, m) from the rectangle around the contact [length]."""
+        offset = points - self.place[:, None]
+        along = self.axes @ offset
+        widths = np.resize(self.widths, len(along))[:, None]
+        beyond = np.maximum(np.abs(along) - widths, 0.0)
+        across = offset - self.axes.T @ along
+        return np.asarray(np.sqrt(np.sum(beyond**2, axis=0) + np.sum(across**2, axis=0)))
 
     def words(self, length: str, face: str, area: float) -> list[str]:
         """What is predicted, and the command that makes elements small enough, unless they are."""
@@ -97,7 +107,8 @@ def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz
         fit, _, rank, _ = np.linalg.lstsq(terms.T, made.gap[order], rcond=1e-8)
         H = np.zeros((len(y), len(y)))
         H[rows, columns] = fit[1 + len(y) :]
-        small, *_, large = [*np.linalg.eigvalsh(H + H.T)] * (3 - len(y))
+        curvatures, ways = np.linalg.eigh(H + H.T)
+        small, *_, large = [*curvatures] * (3 - len(y))
         if rank < len(terms) or not (force > 0 and large < LONG * small):
             continue
         if scene.copies > 1:  # of one of the images, where they are apart
@@ -112,5 +123,6 @@ def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz
             depth = 2 * np.pi * place[0] if scene.analysis.revolved else scene.thickness
             widths = (float(np.sqrt(4 * force / (np.pi * modulus * depth * large))),)
         if widths[0] < np.ptp(made.positions, axis=1).max():
-            found[pair.name] = Hertz(place, force, widths, size)
+            axes = ways.T @ made.frames[at, 1:]
+            found[pair.name] = Hertz(place, force, widths, size, axes)
     return found

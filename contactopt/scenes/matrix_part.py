@@ -102,7 +102,8 @@ class MatrixPart:
             K = self._checked_stiffness(self._matrix("K", self.K))
         if f.shape != K.shape[:1]:
             raise self._wrong(
-                f"f needs {count(K.shape[0], 'number')}, as many as K has rows; got {f.size}."
+                f"f needs {count(K.shape[0], 'number')} in one row, as K has rows; got the shape"
+                f" {f.shape}."
             )
         points = real_array(f"the points of body '{self.name}'", self.points)
         if points.ndim != 2:
@@ -158,6 +159,11 @@ class MatrixPart:
         """K, symmetric to the last digit; InputError for what is no stiffness of a body."""
         if K.shape[0] != K.shape[1] or not K.nnz:
             raise self._wrong(f"K must be square and not empty; got the shape {K.shape}.")
+        if min(abs(sp.tril(K, -1)).sum(), abs(sp.triu(K, 1)).sum()) == 0 < K.nnz - K.shape[0]:
+            raise self._wrong(
+                "K has entries on one side of its diagonal only, as symmetric matrices are often"
+                " stored; give K + K.T - diags(K.diagonal())."
+            )
         lack = abs(K - K.T)
         if lack.max() > EQUAL * abs(K).max():
             i, j = (int(each) for each in np.unravel_index(lack.argmax(), K.shape))
@@ -176,10 +182,12 @@ class MatrixPart:
             )
         usual = float(np.median(size[size > 0])) if np.any(size > 0) else 0.0
         if size[high] > PENALTY * usual:
+            many = np.count_nonzero(size > PENALTY * usual)
             raise self._wrong(
-                f"K has {size[high]:.1e} at unknown {high}, where {usual:.1e} is usual: this is a"
-                " boundary condition by penalty, or another unit; give K without it, and name the"
-                " unknown in fixed."
+                f"K has {size[high]:.1e} at unknown {high} and {many} such unknowns in all, where"
+                f" {usual:.1e} is usual: this is a boundary condition by penalty, or another unit;"
+                " give K without it, or with a usual number in its place, which nothing but the"
+                " force of the support depends on, and name these unknowns in fixed."
             )
         return sp.csr_matrix((K + K.T) / 2)
 

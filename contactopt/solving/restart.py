@@ -135,7 +135,7 @@ def read_known(folder: str | Path) -> Known:
     except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         why = getattr(error, "strerror", None)
         why = f"cannot be read ({why})" if why else "is damaged"
-        raise InputError(f"'{file}' {why}; run the scene anew, without it.") from error
+        raise InputError(f"'{file}' {why}; run the scene again, without it.") from error
 
 
 @dataclass
@@ -242,7 +242,7 @@ def make_restart(
     if file is None:
         raise InputError("to resume a run, give the folder that it was written into, out=...")
     if not file.exists():
-        note(f"nothing was kept in '{out}' yet; the run starts anew")
+        note(f"nothing was kept in '{out}' yet; the run starts again")
         return Restart(file, None, path)
     known = read_known(file.parent)
     if known.complete:

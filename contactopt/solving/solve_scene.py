@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.cards import count
+from contactopt.coupling.posed import Posed, posed
 from contactopt.coupling.reduction import Reduction, reduce_bodies
 from contactopt.defaults import TOL
 from contactopt.errors import InputError
@@ -118,9 +119,12 @@ def solve_scene(
         raise InputError(f"a scene must be a Scene; got {type(scene).__name__}.")
     elements = scene.elements if elements is None else elements
     once = once and options.method in STEPS
+    options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
+    made = posed(scene, elements, zone, options.Q)
     if start is not None and start.turned is not None:
         options = replace(options, Q=start.turned.Q, solver=start.turned.solver)
-        return replace(_one_way(scene, elements, zone, options, start, once), turned=start.turned)
+        solved = _one_way(scene, elements, zone, options, start, once, made)
+        return replace(solved, turned=start.turned)
     gone = 0.0
     notes: tuple[str, ...] = ()
     turned: NextBest | None = None
@@ -128,7 +132,7 @@ def solve_scene(
         begin = time.perf_counter()
         try:
             with open_budget(turned and turned.then):
-                solved = _one_way(scene, elements, zone, options, start, once)
+                solved = _one_way(scene, elements, zone, options, start, once, made)
             break
         except TooDear as too_dear:
             turned = too_dear.instead
@@ -159,12 +163,14 @@ def _one_way(
     options: Options,
     start: Solved | None,
     once: bool,
+    made: Posed,
 ) -> Solved:
-    """The scene solved by the way that the options name, or the cheapest one; TooDear where that
-    takes many more steps than expected.
+    """The scene whose bodies are `made` solved by the way that the options name, or the cheapest
+    one; TooDear where that takes many more steps than expected.
     """
-    options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
-    reduction = reduce_bodies(scene, elements, zone, options.Q, options.solver, once=once)
+    reduction = reduce_bodies(
+        scene, elements, zone, options.Q, options.solver, once=once, made=made
+    )
     coarse: dict[str, float] = {}
     Q = reduction.problem.Q
     # half-spaces have coarse grids of their own

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from copy import deepcopy
 from functools import cache
 from itertools import combinations, product
+from types import CodeType
 
 import numpy as np
 
@@ -65,11 +66,20 @@ WRONG_SIDE = "`{}` stands on the wrong side of a fraction"
 
 def value(formula: str, given: dict[str, float]) -> float:
     """The number that a formula gives."""
-    return _value(ast.parse(formula, mode="eval").body, given)
+    return _evaluated(_compiled(formula), given)
+
+
+@cache
+def _compiled(formula: str) -> CodeType:
+    return compile(formula, "formula", "eval")
 
 
 def _value(node: ast.expr, given: dict[str, float]) -> float:
     code = compile(ast.fix_missing_locations(ast.Expression(node)), "formula", "eval")
+    return _evaluated(code, given)
+
+
+def _evaluated(code: CodeType, given: dict[str, float]) -> float:
     with np.errstate(all="ignore"):
         return float(eval(code, {"__builtins__": {}}, NAMES | given))
 

@@ -71,7 +71,7 @@ def walk_downhill(problem, tol, steps=2000):
 # %% [markdown]
 # **Second idea: guess and sort.** In 2D each contact is open ($r = 0$), sticks ($u = 0$) or slips
 # ($u_n = 0$, $r_t = \pm \mu r_n$). If we knew which of these each contact does, we would only have
-# to solve linear equations. So we guess that all contacts stick, solve, sort the contacts anew by
+# to solve linear equations. So we guess that all contacts stick, solve, sort the contacts again by
 # $y = r - \rho u$, and repeat this until the sorting no longer changes. This is a primal-dual
 # active set method, and it can be understood as Newton's method.
 

@@ -12,13 +12,13 @@ from experiments.site.scene_schema import FILE, schema
 
 def test_the_schema_is_that_of_the_reader():
     assert json.loads(FILE.read_text()) == json.loads(json.dumps(schema())), (
-        "make it anew: python -m experiments.site.scene_schema"
+        "make it again: python -m experiments.site.scene_schema"
     )
 
 
 def test_options_take_the_names_of_the_tables():
     assert json.loads(command_names.FILE.read_text()) == command_names.names(), (
-        "make it anew: python -m experiments.site.command_names"
+        "make it again: python -m experiments.site.command_names"
     )
 
 

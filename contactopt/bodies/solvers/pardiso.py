@@ -116,6 +116,10 @@ class PardisoSolver(BodySolver):
             return np.zeros(load.shape)
         return self._call(np.asfortranarray(load, dtype=float))
 
+    @property
+    def definite(self) -> bool:
+        return bool(self.factors.mtype == DEFINITE)  # Cholesky's factors exist
+
     @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
         """None where rounding left the Schur complement not positive definite."""

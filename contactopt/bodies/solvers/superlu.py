@@ -84,6 +84,13 @@ class SuperLUSolver(BodySolver):
         return out
 
     @cached_property
+    def definite(self) -> bool:
+        # A has as many negative eigenvalues as D has entries; U is made for `trailing` anyway
+        if not self.complete or not np.array_equal(self.factors.perm_c, self.factors.perm_r):
+            return False
+        return bool(self.factors.U.diagonal().min(initial=1.0) > 0)
+
+    @cached_property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
         """None where pivots changed the order or are not positive."""
         factors, n = self.factors, self.n

@@ -107,6 +107,11 @@ class BodySolver(ABC):
         return self.trailing is not None
 
     @property
+    def definite(self) -> bool:
+        """Whether factors that are at hand prove that A is positive definite; False if unknown."""
+        return False
+
+    @property
     def trailing_triangle(self) -> tuple[np.ndarray, np.ndarray] | None:
         """R (m, m) lower triangular and the place (m,) of each of `trailing`: R R' is the Schur
         complement of the others there. None where a solve would be needed.

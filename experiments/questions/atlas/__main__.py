@@ -143,8 +143,8 @@ def section(row: Row, words: dict[str, Any]) -> str:
     if "case" in row:
         case = Case.of(row["case"])
         lines.append(
-            f"The smallest failing problem has {numbers(case)} The method {row['what']}, at a"
-            f" certificate of {row['residual']:.1e}. {words['mechanism']}{taken(words)}"
+            f"The smallest failing problem has {numbers(case)} The method {row['what']}, and ends"
+            f" with a certificate of {row['residual']:.1e}. {words['mechanism']}{taken(words)}"
         )
     elif failed := total(row, "failed"):
         again = "but not when these were run again"
