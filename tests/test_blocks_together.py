@@ -1,10 +1,12 @@
 """Blocks that fill a box and meet at edges and corners bear a uniform pressure without a remark."""
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pytest
 from test_crosspoints import MATERIAL, box
+from turned import turn_about
 
 from contactopt import Contact, Part, Pressure, Scene, Support, run
 
@@ -30,6 +32,17 @@ def blocks(*each, laws=("tied",), degree=1):
                 contacts.append(Contact(f"B{i}:{axis}-", f"B{j}:{axis}+", mu, law))
     kind = "solid" if len(axes) == 3 else "plane-strain"
     return Scene("4", bodies=tuple(parts), contacts=tuple(contacts), kind=kind, degree=degree)
+
+
+def slanted(scene, A):
+    """The scene with every point x at A x, under a pressure of one on all sides, and pinned."""
+    parts, pins = [], (Support("x-/y-/z-"), Support("x+/y-/z-", {"y": 0, "z": 0}))
+    for part in scene.bodies:
+        loads = (*part.loads, *(Pressure(held.boundary, 1.0) for held in part.supports))
+        mesh = replace(part.mesh, doflocs=A @ part.mesh.p)
+        held = () if parts else (*pins, Support("x-/y+/z-", {"z": 0}))
+        parts.append(replace(part, mesh=mesh, supports=held, loads=loads))
+    return replace(scene, bodies=tuple(parts))
 
 
 PLATE = ((0, 0, 0), (2, 2, 0.4), (3, 3, 1), "tri")
@@ -76,6 +89,22 @@ CASES = {
         ((1, 0, 0), (1.5, 1, 1), (1, 1, 1), "tri"),
         laws=("coulomb", "tied", "coulomb", "frictionless", "tied"),
         degree=2,
+    ),
+    "ties that meet at a line are of few elements": blocks(
+        ((0, 0, 0), (0.5, 1, 0.5), (2, 1, 1), "quad"),
+        ((0, 0, 0.5), (0.5, 1, 1), (2, 1, 2), "quad"),
+        ((0.5, 0, 0), (1, 0.5, 1), (2, 1, 1), "quad"),
+        ((0.5, 0.5, 0), (1, 1, 1), (3, 3, 1), "tri"),
+        laws=("coulomb", "tied", "coulomb", "tied", "tied", "tied"),
+    ),
+    "two surfaces share a face of slanted blocks": slanted(
+        blocks(
+            ((0, 0, 0.5), (1, 1, 1), (3, 1, 1), "quad"),
+            ((0, 0, 0), (1, 0.3, 0.5), (2, 1, 2), "quad"),
+            ((0, 0.3, 0), (1, 1, 0.5), (1, 1, 3), "quad"),
+            laws=("coulomb", "tied", "tied"),
+        ),
+        turn_about((1, 2, 3), 40) @ [[1, 0.3, -0.2], [0, 1, 0.4], [0, 0, 1]],
     ),
     "ties of one element": blocks(
         ((0, 0), (2, 0.4), (6, 1), "quad"),

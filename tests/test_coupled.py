@@ -84,7 +84,7 @@ def test_displacements_come_with_the_forces(scene, elements, monkeypatch):
         assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("mu", [0.1, 0.2, 0.3, 0.4, 0.5])
+@pytest.mark.parametrize("mu", [0.1, 0.3, 0.5])
 def test_friction_costs_no_more_cycles_than_four_products(mu):
     reduction = reduce_bodies(scenes.flat_punch(3), 8, solver="multigrid")
     r = np.random.default_rng(0).normal(size=reduction.problem.q.size)

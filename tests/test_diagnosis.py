@@ -438,10 +438,10 @@ def check_states(problem: InterfaceProblem, solution: Solution, said: str, seed:
     assert [*told, 0][:4] == counts, (seed, said)
 
 
-def test_five_hundred_statements_are_true():
+def test_three_hundred_statements_are_true():
     """Each line that `diagnose` prints, by enumeration, by the iterations, and by NumPy."""
     tried = 0
-    for seed in [*range(100), 410]:
+    for seed in [*range(50), 410]:
         problem = any_problem(seed)
         lines = str(diagnose(problem)).splitlines()
         singular = np.linalg.svd(problem.Q)[1]
@@ -462,7 +462,7 @@ def test_five_hundred_statements_are_true():
             said = str(diagnose(problem, answer)).splitlines()[6:]
             check_states(problem, answer, said[0], seed)
             tried += 2
-    assert tried > 500
+    assert tried > 300
 
 
 def test_no_statement_has_a_threshold_at_infinity():

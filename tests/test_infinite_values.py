@@ -1,10 +1,13 @@
 """One mesh knows where a largest value is infinite: at corners, not where an edge goes on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import skfem
+from test_crosspoints import box as rectangle
 
-from contactopt import Contact, Material, Part, Rigid, Scene, Support, run
+from contactopt import Contact, Material, Part, Pressure, Rigid, Scene, Support, run
 
 STEEL = Material(2e5, 0.3)
 SAID = "unless that is rounded, it is infinite"
@@ -53,6 +56,26 @@ def test_pressure_under_a_corner(upper, lower, infinite):
     assert sum("under a corner" in remark for remark in found["remarks"]) == infinite
     assert (SAID in reading.get("message", "")) == infinite
     assert reading["error"] is None if infinite else reading["error"] is not None
+
+
+@pytest.mark.parametrize("kind", ["quad", "tri"])
+def test_no_pressure_is_infinite_where_other_bodies_go_on(kind):
+    """A sleeve in two parts that are tied to each other, around a tube under pressure inside; the
+    seam is pulled, and its largest pressure is its least tension.
+    """
+    parts = []
+    for name, low, high, cells in (("in", (1, 0), (2, 2), (6, 7)), ("a", (2, 0), (3, 1), (5, 4)),
+                                   ("b", (2, 1), (3, 2), (5, 3))):  # fmt: skip
+        held = tuple(Support(f"y{s}", {"z": 0.0}) for s, z in (("-", low), ("+", high))
+                     if z[1] in (0, 2))  # fmt: skip
+        loads = (Pressure("x-", 1.0),) if name == "in" else ()
+        mesh = rectangle(low, high, cells, kind)
+        parts.append(Part(name, mesh, STEEL, held, loads, contact="x-"))
+    pairs = [Contact("b:y-", "a:y+", 0.0, "tied")]
+    pairs += [Contact("in:x+", f"{name}:x-", 0.0) for name in "ab"]
+    scene = Scene("sleeve", bodies=tuple(parts), contacts=tuple(pairs), kind="axisymmetric")
+    for degree in (1, 2):
+        assert not run(replace(scene, degree=degree), figures=()).summary["remarks"]
 
 
 @pytest.mark.parametrize("quantity", ["energy", "pressure"])  # whose estimate says so itself

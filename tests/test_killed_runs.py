@@ -44,7 +44,7 @@ SMALL = {
         {"steps": 2, "elements": 6, "accuracy": 0.5, "quantity": "energy", "adaptive": True},
     ),
 }  # fmt: skip
-MOST = 3  # snapshots of a quick test from which a run is resumed
+MOST = 2  # snapshots of a quick test from which a run is resumed
 
 
 def kept_at_each_step(folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Path]:

@@ -3,6 +3,7 @@
 Its matrices are assembled here with scikit-fem alone, so that they know nothing of ours.
 """
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import meshio
@@ -11,7 +12,7 @@ import pytest
 import scipy.sparse as sp
 import skfem
 from scipy.io import mmread
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import KDTree
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
@@ -36,7 +37,7 @@ from contactopt import (
     solve,
 )
 from contactopt.bodies.fields import von_mises
-from contactopt.bodies.solvers.superlu import SuperLUSolver
+from contactopt.bodies.solvers import solver_type
 from contactopt.coupling.matrices import matrices_of, write_matrices
 from contactopt.readings.plausibility import doubts
 
@@ -382,19 +383,39 @@ def test_input_that_lies_is_found(name):
     assert str(caught.value).endswith(".") and str(caught.value).count(". ") == 0
 
 
-def test_factors_that_are_there_prove_that_a_stiffness_is_definite(monkeypatch):
-    """Two solves then find motions without stiffness, in place of twelve; the third is the load."""
-    count = []
-    solve_with = SuperLUSolver.solve
-    monkeypatch.setattr(
-        SuperLUSolver, "solve", lambda self, *a: count.append(1) or solve_with(self, *a)
-    )
+@pytest.mark.parametrize(
+    ("solver", "Q", "most"), [("superlu", "explicit", 3), ("superlu", "implicit", 14),
+                              ("multigrid", "implicit", 4)],
+)  # fmt: skip
+def test_a_stiffness_is_proved_definite_by_few_solves(solver, Q, most, monkeypatch):
+    """Where factors or conjugate gradients prove it, two solves find motions without stiffness, in
+    place of twelve; the others are those of the loads and of the size of Q.
+    """
+    kind, count = solver_type(solver, 1, 2), []
+    plain = kind.solve
+    monkeypatch.setattr(kind, "solve", lambda self, *a: count.append(1) or plain(self, *a))
     punch = Rigid("punch", force={"y": -1.0}, gap=lambda x: x[0] ** 2)
     scene = Scene("by matrices", punch, MatrixPart("bed", **given()), 0.3)
-    for Q, most in (("explicit", 3), ("implicit", 14)):
-        count.clear()
-        reduce_bodies(scene, Q=Q, solver="superlu")
-        assert len(count) <= most
+    reduce_bodies(scene, Q=Q, solver=solver)
+    assert len(count) <= most
+
+
+def test_conjugate_gradients_find_that_a_stiffness_is_not_definite():
+    """A spring that takes away a little more than the stiffness of one point, deep in a block."""
+    made = matrices(block(skfem.MeshTet, [6, 6, 4], [-1, -1, -1], [1, 1, 0], "above"), 1)
+    fixed = made["order"][np.unique(made["facets"]["far"])].ravel()
+    K, inner = made["K"], np.setdiff1d(np.arange(made["K"].shape[0]), fixed)
+    deep = made["order"][np.argmin(np.abs(made["points"] - [0, 0, -0.5]).sum(axis=1)), 0]
+    unit = (inner == deep).astype(float)
+    least = 1 / spsolve(K[inner][:, inner].tocsc(), unit)[unit > 0][0]
+    punch = Rigid("punch", force={"z": -1.0}, gap=lambda x: x[0] ** 2 + x[1] ** 2)
+    for solver in ("superlu", "multigrid"):
+        for share, right in ((0.9, True), (1.2, False)):
+            made["K"] = added(K, deep, deep, -share * least)
+            part = MatrixPart("bed", fixed=fixed, **made)
+            scene = Scene("by matrices", punch, part, 0.3, kind="solid")
+            with nullcontext() if right else pytest.raises(InputError, match="semidefinite"):
+                reduce_bodies(scene, solver=solver)
 
 
 UNITS = {

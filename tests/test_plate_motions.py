@@ -4,6 +4,7 @@ balance those of supports, plates and loads, with their moments.
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ SMALL = {"cattaneo-2d": {"steps": 1}, "cattaneo-3d": {"steps": 1}, "hertz-dissim
 SMALL["rough"] = {"steps": 2, "points": 40}
 
 
+@cache
 def small(name):
     """The result of a named scene or path on a coarse mesh."""
     elements = {} if name == "rough" else {"elements": 4 if "3d" in name else 8}
@@ -93,7 +95,7 @@ def test_every_reading_is_that_of_the_nodes(name):
 @pytest.mark.parametrize("name", sorted(SCENES))
 def test_the_forces_on_every_body_balance(name):
     """Those that a pair, a support and a plate are said to exert, with their moments."""
-    result = run(name, figures=(), **({} if name == "rough" else {"elements": 4}))
+    result = small(name)
     scene, summary = result.scene, result.summary
     for body, part in {part.name: part for part in scene.parts}.items():
         if not part.meshed or any(isinstance(load, Traction | BodyForce) for load in part.loads):

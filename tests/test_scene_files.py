@@ -163,7 +163,7 @@ carrier = "upper"
 [[contacts]]
 upper = "punch"
 lower = "disc:left"
-mu = 0
+law = "frictionless"
 [solve]
 method = "newton"
 Q = "explicit"
@@ -294,6 +294,7 @@ MISTAKES = [
     ('lower = "floor"', 'lower = "block"', 15, "'block' cannot touch itself"),
     ("mu = 0.4", "mu = -0.4", 15, "friction coefficient mu"),
     ("mu = 0.4", "", 15, "'mu' is missing in contacts"),
+    ("mu = 0.4", 'law = "tresca"', 15, "'mu' is missing in contacts"),
     ("mu = 0.4", 'mu = 0.4\nlaw = "glue"', 19, "glue"),
     ("tol = 1e-10", "tol = 0", 21, "tol must be a finite number greater than 0"),
     ("tol = 1e-10", "accuracy = 0.1", 20, "belong together"),

@@ -108,8 +108,9 @@ def iterations(P, Q):
     return count[0]
 
 
-@pytest.mark.parametrize("size", [3, 4])
-@pytest.mark.parametrize("shape", [disc, annulus, l_shape, graded_corner])
+@pytest.mark.parametrize(
+    ("shape", "size"), [(disc, 3), (annulus, 3), (annulus, 4), (l_shape, 4), (graded_corner, 3)]
+)
 def test_it_fits_half_spaces_under_any_surface(shape, size):
     problem = half_space(*shape(size))
     P = preconditioner(problem, "laplacian")

@@ -76,20 +76,15 @@ def test_a_coating_between_two_contacts_is_reduced_and_does_not_matter():
     """A coating of the block's material, without friction of its own, passes the pressure of the
     punch on.
     """
-    peaks = []
-    for thickness in (2e-4, 1e-4):
-        base = shim(2, thickness, 2, 15)
-        layer, block = base.parts
-        coat = Part("coat", layer.mesh, SOFT, (Support("x-", {"x": 0.0}),))
-        punch = Rigid("punch", normal=(0, 1), gap=lambda x: x[0] ** 2 / 8, force={"y": -1.0})
-        pairs = (Contact("punch", "coat:y+", 0.2), Contact("coat", "block", 0.2))
-        scene = Scene("coated", bodies=(punch, coat, block), contacts=pairs, degree=2)
-        assert np.all(np.isfinite(reduce_bodies(scene).problem.Q))
-        made = run(scene, figures=())
-        assert made.solution.solved
-        assert max(body["imbalance"] for body in made.summary["limits"]["bodies"].values()) < 1e-4
-        peaks.append(made.summary["pairs"]["coat-block"]["force"][1])
-    assert np.allclose(peaks, 1.0, rtol=1e-6)
+    layer, block = shim(2, 1e-4, 2, 15).parts
+    coat = Part("coat", layer.mesh, SOFT, (Support("x-", {"x": 0.0}),))
+    punch = Rigid("punch", normal=(0, 1), gap=lambda x: x[0] ** 2 / 8, force={"y": -1.0})
+    pairs = (Contact("punch", "coat:y+", 0.2), Contact("coat", "block", 0.2))
+    scene = Scene("coated", bodies=(punch, coat, block), contacts=pairs, degree=2)
+    made = run(scene, figures=())
+    assert made.solution.solved and np.all(np.isfinite(made.problem.Q))
+    assert max(body["imbalance"] for body in made.summary["limits"]["bodies"].values()) < 1e-4
+    assert np.isclose(made.summary["pairs"]["coat-block"]["force"][1], 1.0, rtol=1e-6)
 
 
 def test_compact_bodies_have_no_ground():

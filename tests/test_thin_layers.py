@@ -1,5 +1,7 @@
 """Thin layers of quadratic elements follow the body beneath: contacts hold all their nodes."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 import skfem
@@ -51,14 +53,19 @@ def farthest(scene) -> float:
     return float(np.linalg.norm(fields.displacement, axis=0).max())
 
 
+@cache
+def of_quadrilaterals(height, law) -> float:
+    return farthest(layer(height, False, (24, 24), law=law))
+
+
 @pytest.mark.parametrize("law", ["coulomb", "tied"])
-@pytest.mark.parametrize("height", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("height", [1e-2, 1e-4])
 @pytest.mark.parametrize("cells", [(9, 13), (30, 13), (12, 36)])
 def test_a_thin_layer_lies_on_a_block_whatever_its_elements_are(cells, height, law):
     """As thick a layer has nearly the displacement of the block alone, which a layer of
     quadrilaterals shows. On vertices alone, triangles are eleven times off.
     """
-    right = farthest(layer(height, False, (24, 24), law=law))
+    right = of_quadrilaterals(height, law)
     for cut in (False, True):
         assert farthest(layer(height, cut, cells, law=law)) == pytest.approx(right, rel=0.02)
 

@@ -160,6 +160,7 @@ def test_rigid_bodies_of_wrong_fields(fields):
     [
         {"upper": 3},
         {"lower": "punch"},
+        {"mu": None},
         {"mu": -0.1},
         {"mu": np.nan},
         {"mu": "rough"},
@@ -182,6 +183,14 @@ def test_contacts_of_wrong_fields(fields):
     with pytest.raises(InputError):
         contact = Contact(**({"upper": "punch", "lower": "foundation", "mu": 0.3} | fields))
         reduce(Scene("s", bodies=(scene.upper, scene.lower), contacts=(contact,), elements=4))
+
+
+def test_a_law_without_friction_needs_no_coefficient():
+    for law in ("frictionless", "tied"):
+        pair = Contact("punch", "foundation", law=law)
+        assert (pair.mu, pair.friction) == (0.0, law)
+    with pytest.raises(InputError, match="contact 'a-b' has no mu, which the law 'coulomb' needs"):
+        Contact("a", "b")
 
 
 @pytest.mark.parametrize("height", [0.0, -1.0, np.nan], ids=["flat", "turned over", "nowhere"])

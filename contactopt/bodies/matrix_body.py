@@ -26,10 +26,12 @@ from contactopt.bodies.matrix_checks import (
     check_definite,
     check_isolated,
     free_motions_of,
+    indefinite,
     numbered,
     without_stiffness,
 )
 from contactopt.bodies.solvers.ordering import elimination_work
+from contactopt.bodies.solvers.system import INDEFINITE
 from contactopt.cards import count
 from contactopt.checks import place_words, real_array
 from contactopt.defaults import EQUAL
@@ -93,11 +95,13 @@ class MatrixBody(AssembledMatrices):
     def prepare(self, solver: str, entries: bool) -> ElasticBody:
         try:
             made = condense(self.body, solver, entries)
-        except RuntimeError as error:
+            check_definite(self.body, made, self.body.solves is None)
+        except RuntimeError as error:  # of solvers, which say what is wrong
+            if INDEFINITE in str(error):
+                raise indefinite(self.body) from error
             if "singular" not in str(error):
                 raise
             raise without_stiffness(self.body) from error
-        check_definite(self.body, made, self.body.solves is None)
         if self.body.solves is None:
             return made
         return _SolvedBody(**{each.name: getattr(made, each.name) for each in fields(made)})

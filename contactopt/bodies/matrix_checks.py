@@ -187,14 +187,15 @@ def check_definite(body: Matrices, made: ElasticBody, known: bool) -> None:
         return
     K = body.A[kept][:, kept]
     d = np.sqrt(K.diagonal())  # scaled by it, small elements and large ones count alike
-    steps = FEW if made.solver.definite else STEPS
+    # conjugate gradients refuse negative curvature themselves
+    steps = FEW if made.solver.definite or made.solver.iterative else STEPS
     low, high = _extremes(lambda x: np.asarray(K @ (x / d)) / d, start, STEPS)
     softest = _extremes(lambda x: d * solve(d * x), start, steps)
     if min(low, 0.0) < -PIVOT * high or softest[0] < -SAME * softest[1]:
-        raise InputError(
-            f"body '{body.name}': K is not positive semidefinite, since {low:.3g} is among its"
-            f" scaled eigenvalues, or {softest[0]:.3g} among those of its inverse; Lagrange"
-            " multipliers, mixed elements and buckling loads have no place in it."
+        raise indefinite(
+            body,
+            f", since {low:.3g} is among its scaled eigenvalues, or {softest[0]:.3g} among those of"
+            " its inverse",
         )
     if not softest[1] * high * PIVOT < 1:
         raise without_stiffness(body)
@@ -217,6 +218,14 @@ def _extremes(act: Act, x: np.ndarray, steps: int) -> tuple[float, float]:
     H = np.stack(basis[: len(moved)]) @ np.stack(moved, axis=1)
     values = np.linalg.eigvalsh((H + H.T) / 2)
     return float(values[0]), float(values[-1])
+
+
+def indefinite(body: Matrices, why: str = "") -> InputError:
+    """What to raise where K is found to have a negative eigenvalue."""
+    return InputError(
+        f"body '{body.name}': K is not positive semidefinite{why}; Lagrange multipliers, mixed"
+        " elements and buckling loads have no place in it."
+    )
 
 
 def without_stiffness(body: Matrices) -> InputError:

@@ -190,7 +190,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     x = mine.points[:, nodes]
     fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, nodes]
     x = np.where(fixed, x, (sums.own @ mine.points.T).T)
-    if sums.least < -EQUAL * np.ptp(x, axis=1).max():
+    if sums.least < -EQUAL * np.ptp(mine.points, axis=1).max():
         where = place_words(sums.nearest)
         said = "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)"
         _log.warning(said, upper.name, lower.name, -sums.least, where)

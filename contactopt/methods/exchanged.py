@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from contactopt.cards import count
 from contactopt.checks import place_words
@@ -29,6 +30,9 @@ NEAREST = 40
 FEW = 600
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
+SEEN = 1e-6  # size of the friction of an exchange of size one that has some
+EVEN = 1e-3  # relative difference of pressures that are alike
+EMPTY = np.zeros(0, dtype=int)
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 
 
@@ -37,28 +41,27 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
     certificate at most `tol`, and a note of a place where this leaves some, or several solutions.
     """
     points, places = problem.coordinates.T, problem.shared_places
-    if not solution.solved or not places:
+    if not solution.solved or not (places or _meet(problem)):
         return solution
-    known, left, corners = has_entries(problem.Q), [], np.concatenate(places)
+    known, left, corners = has_entries(problem.Q), [], np.concatenate([*places, EMPTY])
     alone = known  # whether each place is looked at by itself
     if known and problem.contacts <= FEW:
         everything = np.arange(problem.contacts)
-        made, some = _exchanged(problem, solution, tol, everything, corners)
-        if some:
-            rubbed = [at[0] for at in places if _rubs(made.reactions[at])]
-            left = [_most_friction(made, corners), *rubbed]
-        alone, solution = some and made is solution, made
+        made, at = _exchanged(problem, solution, tol, everything, corners)
+        if len(at):
+            left = [at[0], *(at[0] for at in places if _rubs(made.reactions[at]))]
+        alone, solution = len(at) > 0 and made is solution, made
     for at in places if alone else ():
         far = np.linalg.norm(points - points[at[0]], axis=1)
         near = np.argsort(far, kind="stable")[:NEAREST]
         solution, some = _exchanged(problem, solution, tol, near, at)
-        left += [at[0]] * some
+        left += [at[0]] * (len(some) > 0)
     said = "the contact forces are not unique: forces that the contacts there exchange change"
     said += " nothing else"
     # in the plane a corner exchanges forces with contacts nearby alone
     unseen = not known or (problem.contacts > FEW and problem.dim == 3)
-    if not left and unseen and _rubs(solution.reactions[corners]):
-        left = [_most_friction(solution, corners), *(at[0] for at in places)]
+    if not left and unseen and places and _rubs(solution.reactions[corners]):
+        left = [*_most_friction(solution, corners), *(at[0] for at in places)]
         why = f"with more than {FEW} contacts" if known else "where Q is known by products only"
         said = f"friction acts; whether its forces there are unique is not looked at {why}"
     if left:
@@ -69,28 +72,43 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
     return solution
 
 
-def _most_friction(solution: Solution, at: np.ndarray) -> int:
+def _meet(problem: InterfaceProblem) -> bool:
+    """Whether contacts of one pair of surfaces are next to those of another one."""
+    points = [problem.coordinates.T[pair.contacts] for pair in problem.pairs]
+    if len(points) < 2 or problem.coordinates.shape[1] != problem.contacts:
+        return False
+    trees = [KDTree(own) for own in points]
+    apart = [tree.query(own, k=[2])[0].ravel() for tree, own in zip(trees, points)]
+    widths = [3 * np.max(d[np.isfinite(d)], initial=0.0) for d in apart]
+    return any(
+        tree.query(own)[0].min() <= max(width, other)
+        for i, (own, width) in enumerate(zip(points, widths))
+        for tree, other in zip(trees[:i], widths)
+    )
+
+
+def _most_friction(solution: Solution, at: np.ndarray) -> np.ndarray:
     """Of some contacts the one with the largest friction."""
-    return int(at[np.argmax(np.linalg.norm(solution.reactions[at, 1:], axis=1))])
+    return at[[np.argmax(np.linalg.norm(solution.reactions[at, 1:], axis=1))]]
 
 
 def _exchanged(
     problem: InterfaceProblem, solution: Solution, tol: float, near: np.ndarray, at: np.ndarray
-) -> tuple[Solution, bool]:
-    """The solution with the least friction that some contacts can exchange, and whether this leaves
-    some at the contacts `at`, or several solutions.
+) -> tuple[Solution, np.ndarray]:
+    """The solution with the least friction that some contacts can exchange, and where this leaves
+    some, at the contacts `at`, or several solutions.
     """
-    left = False
+    left = EMPTY
     for contacts in _closed(problem, solution.reactions, near):
         own, unfelt = exchanges(problem, contacts)
         if not unfelt.size:  # nor do fewer of them exchange any
             return solution, left
-        r, unique = _with_least(solution.reactions, own, unfelt)
+        r, uneven = _with_least(problem, solution.reactions, own, unfelt)
         residual = natural_map_residual(problem, r, solution.multipliers)
         if residual <= max(solution.residual, tol):
             made = replace(solution, reactions=r, residual=residual)
-            return made, not unique or _rubs(r[at])
-        left = True
+            return made, _most_friction(made, at) if _rubs(r[at]) else uneven
+        left = _most_friction(solution, at if len(at) else contacts)
     return solution, left
 
 
@@ -134,16 +152,30 @@ def _closed(problem: InterfaceProblem, r: np.ndarray, at: np.ndarray) -> Iterato
     yield pressed[(inside | ~problem.law.rough)[pressed]]
 
 
-def _with_least(r: np.ndarray, own: np.ndarray, unfelt: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Forces (k, dim) with the least friction among those that are exchanged, and whether there is
-    one choice only.
+def _with_least(
+    problem: InterfaceProblem, r: np.ndarray, own: np.ndarray, unfelt: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (k, dim) with the least friction among those that are exchanged and, of these, with
+    the least sum of pressure times force; and where this sum chose among uneven pressures. Even
+    ones are right: what could be added to them is zero in the mean.
     """
-    tangents = np.flatnonzero(own % r.shape[1])
-    friction = r.ravel()[own[tangents]]
-    y, _, rank, _ = np.linalg.lstsq(unfelt[tangents], -friction, rcond=None)
+    tangents = own % problem.dim > 0
+    seen, sizes, ways = np.linalg.svd(unfelt[tangents], full_matrices=True)
+    rank = int(np.sum(sizes > SEEN))
     changed = r.ravel().copy()
-    changed[own] += unfelt @ y
-    return changed.reshape(r.shape), rank == unfelt.shape[1]
+    friction = seen[:, :rank].T @ changed[own[tangents]]
+    changed[own] -= unfelt @ (ways[:rank].T @ (friction / sizes[:rank]))
+    if rank == len(ways):
+        return changed.reshape(r.shape), EMPTY
+    normal = own[~tangents]
+    weight = 1 / np.sqrt(problem.areas[normal // problem.dim])
+    alone = unfelt[~tangents] @ ways[rank:].T
+    scaled, pressed = alone * weight[:, None], changed[normal] * weight
+    changed[normal] -= alone @ np.linalg.lstsq(scaled, pressed, rcond=None)[0]
+    sizes = np.linalg.norm(scaled, axis=1)
+    pressures = (changed[normal] * weight**2)[sizes > SEEN * sizes.max()]
+    uneven = np.ptp(pressures) > EVEN * np.abs(pressures).max()
+    return changed.reshape(r.shape), normal[[np.argmax(sizes)]] // problem.dim if uneven else EMPTY
 
 
 def _rubs(r: np.ndarray) -> bool:

@@ -69,21 +69,30 @@ def at_re_entrant(reduction: Reduction, peak: Peak) -> bool:
 
 def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     """One sentence if the largest pressure of a pair lies at the rim of its surface, rises towards
-    it, and the bodies fill more than half of the angle there; or an empty text.
+    it, and the bodies fill more than half of the angle there, and with those that other pairs join
+    to them not all of it; or an empty text.
     """
     scene, (view, own) = reduction.scene, views(reduction, solution)[number]
     pressure, places = nodal_pressure(view.problem, own), view.problem.coordinates
     top = int(np.argmax(pressure))
     near = neighbours(view.problem)[top]
     near = near[near != top]
-    if not len(near) or pressure[top] <= RISE * np.max(pressure[near]) or not at_rim(view, own):
+    rises = len(near) > 0 and pressure[top] > max(RISE * np.max(pressure[near]), 0.0)
+    if not rises or not at_rim(view, own):
         return ""
     reach = THERE * np.linalg.norm(places[:, near] - places[:, [top]], axis=0).min()
     reach += abs(view.coupling.gap[top])
-    bodies = [scene.meshed[body] for body in scene.pairs[number].bodies if body in scene.meshed]
-    shares = [_share(body, scene, places[:, top], reach) for body in bodies]
-    total = sum(shares) * (2 if len(shares) == 1 else 1)
-    if total <= 0.5 + CORNER / (2 * np.pi):
+    bodies = set(scene.pairs[number].bodies)
+    joined = {name for pair in scene.pairs if bodies & {*pair.bodies} for name in pair.bodies}
+
+    def filling(names: set[str], away: float) -> float:
+        parts = [part for name, part in scene.meshed.items() if name in names]
+        return sum(_share(part, scene, places[:, top], reach, away) for part in parts)
+
+    images = 2 if bodies - scene.meshed.keys() else 1
+    own_share = images * filling(bodies, 0.5)
+    most = 1 - CORNER / (2 * np.pi)
+    if own_share <= 1.5 - most or own_share + images * filling(joined - bodies, 0.0) >= most:
         return ""
     place = place_words(places[:, top])
     return (
@@ -92,14 +101,12 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     )
 
 
-def _share(part: Part, scene: Scene, place: np.ndarray, reach: float) -> float:
-    """The share of the full angle that a body fills around a place on its boundary: half of it away
-    from its vertices.
-    """
+def _share(part: Part, scene: Scene, place: np.ndarray, reach: float, away: float) -> float:
+    """The share of the full angle that a body fills around a place: `away` from its vertices."""
     cells = simplices(straight(part.build_mesh(scene.elements, scene.zone)))
-    away = np.linalg.norm(cells.p - place[:, None], axis=0)
-    vertex = int(np.argmin(away))
-    return filled(cells, vertex) if away[vertex] <= reach else 0.5
+    far = np.linalg.norm(cells.p - place[:, None], axis=0)
+    vertex = int(np.argmin(far))
+    return filled(cells, vertex) if far[vertex] <= reach else away
 
 
 def re_entrant(mesh: Mesh, vertex: int) -> bool:

@@ -28,7 +28,7 @@ class Contact:
     mu            what the law reads: the friction coefficient, for 'tresca' a bound of the
                   tangential traction [stress]; a number >= 0, one per contact (k,), or a function
                   of the contacts' positions (dim, k) that gives either; for 'orthotropic' two
-                  coefficients instead of one
+                  coefficients instead of one; left out for a law without friction
     law           a name in contactopt.problem.laws.LAWS
     coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits
                   the surfaces
@@ -40,7 +40,8 @@ class Contact:
 
     upper: str
     lower: str
-    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any]
+    # no number stands for a law without friction, and is 0 once the contact is made
+    mu: float | Sequence[float] | np.ndarray | Callable[[np.ndarray], Any] = None  # type: ignore
     law: str = "coulomb"
     coupling: str = "auto"
     carrier: str | None = None
@@ -61,6 +62,13 @@ class Contact:
         law = find_law(self.law)
         if self.direction is not None:
             _check_direction(self.name, self.direction, law)
+        if self.mu is None and not law.frictional:
+            object.__setattr__(self, "mu", 0.0)
+        elif self.mu is None:
+            raise InputError(
+                f"contact '{self.name}' has no mu, which the law '{self.law}' needs; give its"
+                " coefficient, or the law 'frictionless' or 'tied'."
+            )
         if not callable(self.mu):
             _check_friction(self.mu)
 
@@ -83,6 +91,8 @@ class Contact:
     def friction(self) -> str:
         """The law and its number, for titles: 'mu = 0.3'."""
         law = find_law(self.law)
+        if not law.frictional:
+            return self.law
         plain = law.proportional and law.frictional and not law.dilatant
         name = "mu" if plain else f"{self.law}, mu"
         if callable(self.mu):

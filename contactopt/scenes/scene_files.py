@@ -18,7 +18,7 @@ import numpy as np
 from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, at_line, change, read_table
-from contactopt.problem.laws import LAWS
+from contactopt.problem.laws import LAWS, find_law
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
 from contactopt.scenes.contact import SIDES, Contact
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
@@ -253,7 +253,7 @@ def _contact(table: Table, parts: list[Any], reading: FileContext) -> Contact:
     if isinstance(table.data.get("mu"), list):
         mu: Any = tuple(table.numbers("mu", 2, "a number, or two: along and across a direction"))
     else:
-        mu = function_of(table, "mu", reading, needed=True)
+        mu = function_of(table, "mu", reading, needed=_rubs(table))
     names: dict[str, Any] = {"law": LAWS, "coupling": (), "carrier": SIDES}
     texts = {key: table.take(key, str, among=known) for key, known in names.items()}
     given: dict[str, Any] = {key: value for key, value in texts.items() if value is not None}
@@ -265,6 +265,12 @@ def _contact(table: Table, parts: list[Any], reading: FileContext) -> Contact:
         made = Contact(upper, lower, mu, **given)
     table.close()
     return made
+
+
+def _rubs(table: Table) -> bool:
+    """Whether the law of a contact needs a coefficient; an unknown law is told later."""
+    law = table.data.get("law")
+    return law not in LAWS or find_law(law).frictional
 
 
 def _solve(table: Table | None) -> dict[str, Any]:

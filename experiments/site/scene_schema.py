@@ -153,7 +153,6 @@ def _object(place: tuple[str, ...], found: dict[tuple[str, ...], list[Asked]]) -
     if asked:
         made["properties"] = {key: _entry(place, key, own, found) for key, own in asked.items()}
     given = {key for key, own in asked.items() if all(one.needed for one in own)} - {"mu"}
-    given |= {"mu"} & set(asked) if place else set()  # of the scene only where contacts are found
     needed = sorted(given - {axis for own in KINDS.values() for axis in own.components})
     return made | ({"required": needed} if needed else {})
 

@@ -29,7 +29,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from contactopt.bodies.motions import rigid_fields
 from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL, USUAL
 from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduct, galerkin
-from contactopt.bodies.solvers.system import Act, BodySolver, Submatrix, System
+from contactopt.bodies.solvers.system import INDEFINITE, Act, BodySolver, Submatrix, System
 from contactopt.checks import check_number
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.budget import expect, spend
@@ -183,7 +183,8 @@ def conjugate_gradients(
     """Solve A x = load, load (n,) [force], by conjugate gradients with a V-cycle B.
 
     It ends where (r' B r)^1/2, with the residual r, has fallen by `rtol`; BackendError if it does
-    not get there within MOST_ITERATIONS iterations, or if r' B r is negative or not a number.
+    not get there within MOST_ITERATIONS iterations, if r' B r is negative or not a number, or if A
+    is found not to be positive definite.
     TooDear instead, where a budget is open.
     """
     r = np.array(load, dtype=float)
@@ -201,7 +202,10 @@ def conjugate_gradients(
             )
         p = z + (size / previous) * p
         Ap = A @ p
-        alpha = size / _dot(p, Ap)
+        curvature = _dot(p, Ap)
+        if curvature <= 0:
+            raise BackendError(f"multigrid: {INDEFINITE}.")
+        alpha = size / curvature
         x += alpha * p
         r -= alpha * Ap
     expect(slower=np.inf)
