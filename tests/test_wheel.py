@@ -48,7 +48,30 @@ def wheel(tmp_path_factory) -> Path:
     return path
 
 
-@pytest.mark.slow
+def environment(folder: Path, *packages: str | Path, beneath: Path | None = None) -> Path:
+    """The Python of a new environment with these packages; it sees those of the one beneath."""
+    run(sys.executable, "-m", "venv", folder, cwd=folder.parent)
+    python = folder / ("Scripts" if os.name == "nt" else "bin") / "python"
+    if beneath is not None:
+        where = "import sysconfig; print(sysconfig.get_path('purelib'))"
+        own, lower = (Path(run(one, "-c", where, cwd=folder).strip()) for one in (python, beneath))
+        (own / "beneath.pth").write_text(f"{lower}\n")
+    run(python, "-m", "pip", "install", "--quiet", *packages, cwd=folder)
+    return python
+
+
+@pytest.fixture(scope="module")
+def plain(wheel, tmp_path_factory) -> Path:
+    """The Python of an environment with the wheel and what it needs, without any extra."""
+    return environment(tmp_path_factory.mktemp("plain") / "venv", wheel)
+
+
+def INSTALLS(test):
+    """A slow test of the wheel: one worker builds and installs it for all of them."""
+    return pytest.mark.slow(pytest.mark.xdist_group("wheel")(test))
+
+
+@INSTALLS
 def test_it_holds_the_package_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     modules = {str(p.relative_to(ROOT)) for p in ROOT.joinpath("contactopt").rglob("*.py")}
@@ -60,11 +83,9 @@ def test_it_holds_the_package_and_nothing_else(wheel):
     assert {name.split("/")[0].split("-")[0] for name in names} == {"contactopt"}
 
 
-@pytest.mark.slow
-def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
-    run(sys.executable, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
-    binaries = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin")
-    run(binaries / "python", "-m", "pip", "install", "--quiet", wheel, cwd=tmp_path)
+@INSTALLS
+def test_it_installs_and_runs_in_an_empty_environment(wheel, plain, tmp_path):
+    binaries = plain.parent
     assert "punch-2d" in run(binaries / "contactopt", "list", cwd=tmp_path)
     run(binaries / "contactopt", "run", "punch-2d", "--out", tmp_path / "out", cwd=tmp_path)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
@@ -77,7 +98,7 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     assert (tmp_path / "page.html").stat().st_size > 50_000, "pages need no extra"
     code = "import contactopt; print(contactopt.__version__, contactopt.__file__)"
     version, place = run(binaries / "python", "-c", code, cwd=tmp_path).split()
-    assert version in wheel.name and str(tmp_path) in place
+    assert version in wheel.name and str(plain.parents[1]) in place
     user = tmp_path / "user.py"
     user.write_text(
         "import contactopt\nreveal_type(contactopt.run('punch-2d').solution.residual)\n"
@@ -87,7 +108,7 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, tmp_path):
     assert re.search(r'"(builtins\.)?float"', told), "users' type checkers see the types"
 
 
-# what each extra is for, tried in an environment that has this extra alone
+# what each extra is for, tried in an environment that has no other extra
 TRIED = {
     "fclib": """
 from contactopt import fclib, reduce, scenes
@@ -147,19 +168,13 @@ INTO_DOCS = ("experiments", "reports", "pyproject.toml", "LICENSE")
 INTO_DOCS += ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 
 
-@pytest.mark.slow
+@INSTALLS
 @pytest.mark.parametrize("extra", [*TRIED, "docs"])
-def test_each_extra_alone_does_what_it_is_for(wheel, tmp_path, extra):
-    run(sys.executable, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
-    python = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin") / "python"
-    run(python, "-m", "pip", "install", "--quiet", f"{wheel}[{extra}]", cwd=tmp_path)
+def test_each_extra_alone_does_what_it_is_for(wheel, plain, tmp_path, extra):
+    python = environment(tmp_path / "venv", f"{wheel}[{extra}]", beneath=plain)
     if extra != "docs":
-        run(
-            python,
-            "-c",
-            f"if __name__ == '__main__':\n{indent(TRIED[extra], '    ')}",
-            cwd=tmp_path,
-        )
+        program = f"if __name__ == '__main__':\n{indent(TRIED[extra], '    ')}"
+        run(python, "-c", program, cwd=tmp_path)
         return
     # the pages, as README says; what they execute is executed where README's commands are typed
     for name in INTO_DOCS:

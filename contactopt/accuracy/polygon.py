@@ -21,9 +21,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 from skfem import Mesh
 
+from contactopt.meshes.facet_surfaces import SAME
+
 # begin, end (2, f) and sagitta in doubt (f,) [length]
 Chords = tuple[np.ndarray, np.ndarray, np.ndarray]
-SAME = 1e-3  # relative difference of curvatures that rounding of files makes
 NEAREST = 8  # edges among which that of a point is looked for
 
 

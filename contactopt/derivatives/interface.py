@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from contactopt.checks import check_number, real_array
 from contactopt.derivatives.kinks import Onesided, Weak, of_kinks, weak_contacts
-from contactopt.derivatives.linear import ACCURACY, Tangent, transposed
+from contactopt.derivatives.linear import Tangent, transposed
 from contactopt.errors import InputError
+from contactopt.linear.operators import FINEST
 from contactopt.methods.kernels.coupled_newton import improved
 from contactopt.problem import (
     InterfaceProblem,
@@ -119,7 +120,7 @@ class Sensitivity:
         held = immovable(problem).reshape(problem.q.shape)
         if held.any():
             D[held[:, :, None] | held[:, None, :]] = 0.0
-        accuracy = max(ACCURACY, min(self.solution.residual, CERTIFIED))
+        accuracy = max(FINEST, min(self.solution.residual, CERTIFIED))
         return Tangent(problem, without_rounding(problem.V), self._rho, D, accuracy)
 
     @cached_property

@@ -28,7 +28,7 @@ import scipy.linalg as la
 from contactopt.derivatives.constants import INNER, ROUND
 from contactopt.derivatives.factors import UNIQUE, Factors, SparseFactors, dense_factors
 from contactopt.errors import InputError
-from contactopt.linear.operators import Interface, form, has_entries
+from contactopt.linear.operators import FINEST, Interface, form, has_entries
 from contactopt.linear.stacked import Stacked, norm
 from contactopt.methods.constants import LOOSE
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
@@ -39,7 +39,6 @@ from contactopt.methods.kernels.linearised import Linearised
 from contactopt.problem import InterfaceProblem, dimensionless
 from contactopt.problem.scaling import scales_of
 
-ACCURACY = 1e-11  # least relative residual of an iterative solve
 ROUNDS = 12  # of GMRES, which gain four digits each
 
 # error (k d,), balance (p,) -> dr and dlambda of these shapes, and what gives Q dr
@@ -67,7 +66,7 @@ class Tangent:
     V: np.ndarray
     rho: np.ndarray
     D: np.ndarray
-    accuracy: float = ACCURACY
+    accuracy: float = FINEST
 
     def slope(self, moved: np.ndarray) -> np.ndarray:
         """D rho moved (k d,)."""

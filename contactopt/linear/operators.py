@@ -25,7 +25,7 @@ FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 FINEST = 1e-11  # accuracy of products that is not asked for more
 POWER_STEPS, MARGIN = 10, 1.1  # towards a largest eigenvalue, and the factor on what they find
-COLUMNS = 64  # unit vectors handed to the bodies at a time when the entries of Q are asked for
+COLUMNS = 64  # of an inverse or of Q that are made at a time, which bounds the memory beside it
 # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
 NOTABLE_BYTES = 2**28
 # of an array Q; those who factorise it need another one or two of its size

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
+from contactopt.checks import LARGEST as FAR
 from contactopt.errors import Damaged, InputError
 
 log = logging.getLogger("contactopt.meshes.inp")
@@ -47,7 +48,6 @@ SECTIONS = {
 STIFFENING = {"foundation", "rebar", "rebarlayer"}  # keywords of what elements do not show
 DEEPEST = 10  # files that include each other
 LARGEST = 2**31  # numbers of nodes, elements and lines are smaller
-FAR = 1e100  # larger coordinates have no volume in floating-point numbers
 OPEN = "a quotation mark is not closed"
 COMMA = re.compile(r',(?=(?:[^"]*"[^"]*")*[^"]*$)')  # not within quotation marks
 Row = tuple[int, list[str]]  # place of the line in Source, and words

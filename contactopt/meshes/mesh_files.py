@@ -16,7 +16,7 @@ import numpy as np
 import skfem
 
 from contactopt.cards import count
-from contactopt.checks import check_number, overheard, place_words, remember
+from contactopt.checks import LARGEST, check_number, overheard, place_words, remember
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.inp_elements import FACES
@@ -31,7 +31,6 @@ from contactopt.meshes.mesh_repair import (
     representatives,
 )
 
-FAR = 1e100  # larger coordinates have no volume in floating-point numbers
 log = logging.getLogger(__name__)
 
 
@@ -161,11 +160,11 @@ def _place(path: Path, groups: FileGroups) -> tuple[int, np.ndarray]:
     points = np.asarray(groups.points, dtype=float)
     own = [nodes.ravel() for _, nodes, dims in groups.blocks if dims == dim]
     cells = np.unique(np.concatenate(own))
-    lost = cells[~np.all(np.abs(points[cells]) < FAR, axis=1)]
+    lost = cells[~np.all(np.abs(points[cells]) < LARGEST, axis=1)]
     if len(lost):
         raise InputError(
             f"mesh file '{path}': the coordinates of node"
-            f" {lost[0] + 1} are no numbers below {FAR:g}."
+            f" {lost[0] + 1} are no numbers below {LARGEST:g}."
         )
     if dim == points.shape[1]:
         return dim, points.T

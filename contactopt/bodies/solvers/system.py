@@ -12,11 +12,10 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from contactopt.errors import InputError
-from contactopt.linear.operators import Product
+from contactopt.linear.operators import COLUMNS, Product
 
 Act = Callable[[np.ndarray], np.ndarray]
 INDEFINITE = "the stiffness is not positive definite"  # in what a solver raises where it is not
-COLUMNS = 64  # of the inverse that are made at a time, which bounds the memory beside it
 
 
 @dataclass(frozen=True, eq=False)

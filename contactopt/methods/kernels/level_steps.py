@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
+from contactopt.linear.flexible_gmres import RESTART, RUNS
 from contactopt.methods import constants
 from contactopt.methods.constants import FIRST_SHIFT, SHIFT_RATIO
 from contactopt.methods.kernels.elimination import eliminated
@@ -26,7 +27,6 @@ from contactopt.methods.kernels.newton_loop import Forcing, Unknowns
 logger = logging.getLogger(__name__)
 
 ENOUGH = 0.5  # of what is enough that a step aims at, for linear systems are not solved in its norm
-RESTART, CYCLES = 40, 3  # of GMRES
 ITERATIONS = 100  # of PCG
 
 Act = Callable[[np.ndarray], np.ndarray]
@@ -150,7 +150,7 @@ def _unsymmetric(
         right,
         rtol=rtol,
         restart=min(n + p, RESTART),
-        maxiter=CYCLES,
+        maxiter=RUNS,
         M=LinearOperator((n + p, n + p), matvec=lambda x: border.solve(x.ravel()), dtype=float),
         callback=iterations.append,
         callback_type="pr_norm",

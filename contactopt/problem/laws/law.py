@@ -9,15 +9,13 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from contactopt.checks import real_array
+from contactopt.checks import LARGEST, real_array
 from contactopt.errors import InputError
 from contactopt.problem.cones import lengths, unit
 from contactopt.problem.laws.place import Place
 
 PRESSED = 1e-8  # normal forces below this fraction of the largest are rounding: the contact is open
 BELOW = 1e-6  # a tangential force sticks if it is below its bound by a larger share of the bound
-
-LARGEST = 1e100  # friction beyond which products overflow; nothing slips long before
 Projected = tuple[np.ndarray, np.ndarray]  # points (k, dim), generalised derivatives (k, dim, dim)
 
 
@@ -68,7 +66,7 @@ class Law:
                 known = {"mu": "the friction coefficient mu", "limit": "the friction bound"}
                 what, least = known.get(name, name), value.min()
                 raise InputError(f"{what} must not be negative; its least value is {least:g}.")
-            value = np.minimum(value, LARGEST)
+            value = np.minimum(value, LARGEST)  # nothing slips long before
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
