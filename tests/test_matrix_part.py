@@ -385,11 +385,11 @@ def test_input_that_lies_is_found(name):
 
 @pytest.mark.parametrize(
     ("solver", "Q", "most"), [("superlu", "explicit", 3), ("superlu", "implicit", 14),
-                              ("multigrid", "implicit", 3)],
+                              ("multigrid", "implicit", 4)],
 )  # fmt: skip
 def test_a_stiffness_is_proved_definite_by_few_solves(solver, Q, most, monkeypatch):
     """Where factors or conjugate gradients prove it, two solves find motions without stiffness, in
-    place of twelve; the third is that of the loads.
+    place of twelve; the others are those of the loads and of the size of Q.
     """
     kind, count = solver_type(solver, 1, 2), []
     plain = kind.solve

@@ -250,3 +250,27 @@ def test_neither_reading_changes_with_a_translation_of_the_scene(held):
         for mesh in (ends[name].mesh,)
     ]
     assert free.history["approach"][0] == pytest.approx(at[1] - at[0], rel=1e-9)
+
+
+def test_a_body_between_two_others_has_no_mean_normal():
+    """As the upper body of both pairs: their normals are opposite."""
+    parts = [
+        Part("low", block("plane-strain", -1, 0), MATERIAL, (Support("bottom"),), contact="top"),
+        Part("mid", block("plane-strain", 0, 1), MATERIAL, contact="bottom"),
+        Part(
+            "high",
+            block("plane-strain", 1, 2),
+            MATERIAL,
+            (),
+            (Plate("top", {"y": -1.0}),),
+            contact="bottom",
+        ),
+    ]
+    sides = (("mid:bottom", "low:top"), ("mid:top", "high:bottom"))
+    approaches = []
+    for flip in (False, True):
+        second = sides[1][::-1] if flip else sides[1]
+        pairs = (Contact(*sides[0], 0.3), Contact(*second, 0.3))
+        scene = Scene("s", bodies=tuple(parts), contacts=pairs)
+        approaches.append(run(scene).summary["approach"])
+    assert approaches[0] is None and approaches[1] > 0

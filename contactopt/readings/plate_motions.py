@@ -86,6 +86,10 @@ def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
     length = float(np.linalg.norm(mean))
     if length < CLOSED:
         return None if component == 0 else made
+    if component == 0:
+        whole = np.array([areas[own.contacts] @ frames[own.contacts] for own in problem.pairs])
+        if np.any(whole @ mean < 0):  # bodies on both sides of one, as raceways of a ball
+            return None
     for owner, sign in zip(owners, (1.0, -1.0)):
         for c in np.flatnonzero(mean):
             areas = _of_those(counts[owner, c], problem.areas)

@@ -58,7 +58,7 @@ const SCALES = {  // of an axis: a value's place, which values have one, round p
 
 // Lines {name, x, y, ink} in a box. `pairs`: every two points are a line of their own; `steps`: upright and level lines; `dots`: the look of a dot i, with its words.
 function chart(box, lines, across, up, {x = "linear", y = "linear"} = {}) {
-  const W = Math.max(260, box.clientWidth || 560), H = Math.round(0.6 * W), [L, R, T, B] = [58, 14, 24, 40], [h, v] = [SCALES[x], SCALES[y]];
+  const W = Math.max(260, box.clientWidth || 560), H = Math.round(0.6 * W), [L, R, T, B] = [58, 14, 28, 40], [h, v] = [SCALES[x], SCALES[y]];
   const picture = svg("svg", {viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${up} against ${across}`});
   const seen = lines.map((line) => ({...line, at: Array.from(line.x, (own, i) => [h.of(own), v.of(line.y[i]), i]).filter(([, , i]) => h.has(line.x[i]) && v.has(line.y[i]))})).filter((line) => line.at.length);
   box.replaceChildren();

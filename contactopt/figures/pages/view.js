@@ -169,7 +169,6 @@ function paintContact(pair, colours) {
   const shape = shaped(pair, [state(pair, now.contact)]), places = painter.places(shape.xyz), meta = {contact: contacts.indexOf(pair), from: shape.from, places};
   if (pair.lines?.length) {
     const {places: corners, cells, from} = painter.ribbon(places, shape.lines(pair.lines), 8);
-    painter.lines(places, shape.lines(pair.lines), 20, 10, 5);
     painter.triangles(corners, cells, from.map((node) => shape.values[node]), {...colours, lit: false, towards: 7, first: own(pair, {...meta, places: corners, from}, cells)});
   } else if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, lit: false, towards: painter.dense, first: own(pair, meta, shape.cells)});
   else painter.dots(places, shape.values, 3, {...colours, first: own(pair, meta)});
@@ -364,24 +363,25 @@ function requestDraw() {  // at once as it moves, and in full when it rests
   requestAnimationFrame(() => { asked = false; draw(true); });
 }
 
-function sections(pair, c) {  // lines across the triangles of a surface in space, along coordinate c of the surface through the largest pressure
-  const length = count(pair), pressure = state(pair, "pressure"), [x, y] = [c, 1 - c].map((own) => pair.place.subarray(own * length, (own + 1) * length)), peak = pressure.reduce((best, value, i) => (value > pressure[best] ? i : best), 0), made = {x: [], y: []};
-  const [low, high] = span([y]), level = y[peak] + 1e-6 * ((low + high) / 2 - y[peak] || high - low);  // beside the nodes, inside the surface
-  for (let t = 0; t < pair.cells.length; t += 3) for (let k = 0; k < 3; k++) {
-    const a = pair.cells[t + k], b = pair.cells[t + ((k + 1) % 3)];
+function sections(pair, c) {  // a line across a surface in space through the largest pressure, along one of the two axes that lie most in the surface
+  const length = count(pair), pressure = repeated(state(pair, "pressure")), cells = numbered(whole(pair, "cells"), length), peak = pressure.reduce((best, value, i) => (value > pressure[best] ? i : best), 0) % length, force = state(pair, "vector").subarray(3 * peak);
+  const ways = [0, 1, 2].sort((a, b) => Math.abs(force[a]) - Math.abs(force[b])).slice(0, 2).sort(), [x, y] = [c, 1 - c].map((own) => placed(pair)[ways[own]]), made = {x: [], y: [], name: `along ${data.axes[ways[c]]}`};
+  const [low, high] = span([y]), level = y[peak] + 1e-4 * (y[peak] > (low + high) / 2 ? low - high : high - low);  // beside the nodes, inside the surface
+  for (let t = 0; t < cells.length; t += 3) for (let k = 0; k < 3; k++) {
+    const a = cells[t + k], b = cells[t + ((k + 1) % 3)];
     if (y[a] > level === y[b] > level) continue;
     const share = (level - y[a]) / (y[b] - y[a]);
     made.x.push(x[a] + share * (x[b] - x[a])); made.y.push(pressure[a] + share * (pressure[b] - pressure[a]));
   }
   const touches = (_, i) => Math.max(made.y[i - (i % 2)], made.y[i - (i % 2) + 1]) > 1e-3 * pressure[peak];  // either end of a line
-  return {x: made.x.filter(touches), y: made.y.filter(touches), pairs: true};
+  return {...made, x: made.x.filter(touches), y: made.y.filter(touches), pairs: true};
 }
 
 function drawContact() {
   const box = control("contact-chart"), pair = contacts[Number(control("pair").value) || 0];
   if (!pair) return;
   if (!flat) {
-    chart(box, [0, 1].map((c) => ({...sections(pair, c), name: `along ${"xy"[c]}`, ink: [COLOURS.green, COLOURS.orange][c]})), `place on the surface, 0 at its middle [${LENGTH}]`, `pressure on lines through its largest value [${STRESS}]`);
+    chart(box, [0, 1].map((c) => ({...sections(pair, c), ink: [COLOURS.green, COLOURS.orange][c]})), `place on the line [${LENGTH}]`, `pressure on lines through its largest value [${STRESS}]`);
     return;
   }
   const order = [...pair.place.keys()].sort((a, b) => pair.place[a] - pair.place[b]), sorted = (values) => order.map((i) => values[i]), x = sorted(pair.place);
