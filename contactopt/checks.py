@@ -29,8 +29,8 @@ RESERVED = {
     *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10)),
 }
 LONGEST_NAME = 100  # characters
-# of forces, stresses and lengths: powers of larger and of smaller ones are lost to floating point
-SMALLEST, LARGEST = 1e-100, 1e100
+# of forces, stresses and lengths: fourth powers of others are lost to floating point
+SMALLEST, LARGEST = 1e-70, 1e70
 # modules whose warnings are of bodies
 OF_BODIES = ("coupling.mortar", "bodies.rigid", "meshes.mesh_repair", "meshes.mesh_refinement")
 

@@ -1,5 +1,6 @@
 """Input that can be solved and is not what is meant: one sentence, the same in check and in run."""
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -109,6 +110,15 @@ WRONG = {
 def test_what_is_probably_not_meant_is_told_by_check_and_by_run(name):
     changes, words = WRONG[name]
     assert any(words in note for note in said(pressed(**changes)))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("changes", [
+    {"load": ("up", -9e69)}, {"upper": ((0, 9e69), (0, 10))}, {"lower": ((-5, 15), (-9e69, 0))},
+])  # fmt: skip
+def test_the_largest_numbers_make_no_warning(changes):
+    with contextlib.suppress(InputError):
+        run(pressed(**changes), figures=())
 
 
 def test_a_plate_on_a_contact_surface_is_told():

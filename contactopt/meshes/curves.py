@@ -88,7 +88,9 @@ def rounding(points: np.ndarray) -> float:
     """Find how far nodes (dim, m) may be off because a file rounds its numbers [length]."""
     size, largest = np.ptp(points, axis=1).max(), np.abs(points).max()
     least = max(EQUAL * size, 16 * np.finfo(float).eps * largest)
-    if np.array_equal(points, points.astype(np.float32)):
+    with np.errstate(over="ignore"):  # a place beyond single precision is none of it
+        single = np.array_equal(points, points.astype(np.float32))
+    if single:
         return float(max(least, 2.0**-22 * largest))
     sample = points.ravel()[:: max(1, points.size // 200)]
     for digits in DIGITS:

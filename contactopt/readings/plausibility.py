@@ -199,7 +199,7 @@ def _sizes(scene: Scene) -> list[str]:
         ratio = size[large] / size[small]
         if ratio > LARGER:
             notes.append(
-                f"body '{large}' is {ratio:.0f} times as large as '{small}': are both given in the"
+                f"body '{large}' is {ratio:.4g} times as large as '{small}': are both given in the"
                 " unit of length of the scene?"
             )
     return notes
