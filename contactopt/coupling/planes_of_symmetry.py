@@ -90,7 +90,8 @@ def mirror_planes(
     """The planes of symmetry, one for each direction, of a scene with two copies or more: those
     `cutting` a contact surface, those of the axes that the scene names, and those on which supports
     guide a body and which have all bodies on one side. If there are more of these than the copies
-    ask for, as a floor on which one body stands, those count that guide every body. InputError if no such plane lies across an axis that the scene names.
+    ask for, as a floor on which one body stands, those count that guide every body.
+    InputError if no such plane lies across an axis that the scene names.
     """
     found: list[SymmetryPlane] = []
     for plane in cutting:
