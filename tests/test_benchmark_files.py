@@ -15,7 +15,8 @@ from contactopt import InputError, Material, Part, Rigid, run, scenes
 from contactopt.cli import main
 from contactopt.files.writing import OLD, whole_folder
 from tests.conftest import block, two_blocks
-from tests.test_benchmark_faults import BAD_NAMES, one_line
+from tests.test_benchmark_faults import one_line
+from tests.test_benchmark_names import BAD_NAMES
 
 
 @pytest.mark.parametrize("name", BAD_NAMES)

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 import skfem
 from conftest import MATERIAL, block, two_blocks
-from skfem.helpers import ddot, sym_grad, trace
 
 from contactopt import (
     BodyForce,
@@ -17,8 +16,6 @@ from contactopt import (
     reduce,
 )
 from contactopt.bodies.body import build_body
-from contactopt.bodies.elements import weight_at
-from contactopt.material import lame
 from contactopt.meshes.cells import split_twice
 
 KINDS = ["plane-strain", "axisymmetric", "solid"]
@@ -36,39 +33,6 @@ def body_of(kind, **part):
         )
     )
     return build_body(Scene("s", scene.upper, part, 0.0, kind=kind), part, 1, None)
-
-
-def triangulated(kind):
-    mesh = block(kind, -2, 0)
-    split = mesh.to_meshtri() if kind != "solid" else mesh.to_meshtet()
-    up = split.p[-1]
-    return split.with_boundaries(
-        {"top": lambda x: x[-1] == up.max(), "bottom": lambda x: x[-1] == up.min()}
-        | {f"side{i}": (lambda x, i=i: x[i] == 0) for i in range(len(split.p) - 1)}
-    )
-
-
-@pytest.mark.parametrize("simplices", [False, True])
-@pytest.mark.parametrize("kind", KINDS)
-def test_stiffness_is_the_weak_form_of_elasticity(kind, simplices):
-    """Against scikit-fem's own assembly of sigma(u) : epsilon(v)."""
-    body = body_of(kind, mesh=triangulated(kind)) if simplices else body_of(kind)
-    lam, shear = lame(MATERIAL)
-
-    @skfem.BilinearForm
-    def elasticity(u, v, w):
-        volume, volume_v, energy = (
-            trace(sym_grad(u)),
-            trace(sym_grad(v)),
-            ddot(sym_grad(u), sym_grad(v)),
-        )
-        if kind == "axisymmetric":
-            volume, volume_v = volume + u[0] / w.x[0], volume_v + v[0] / w.x[0]
-            energy = energy + u[0] * v[0] / w.x[0] ** 2
-        return (lam * volume * volume_v + 2 * shear * energy) * weight_at(body.weight, w.x)
-
-    expected = elasticity.assemble(body.basis)
-    assert abs(body.A - expected).max() <= 1e-13 * abs(expected).max()
 
 
 @pytest.mark.parametrize("kind", KINDS)

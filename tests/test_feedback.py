@@ -189,6 +189,7 @@ def test_numbers_of_every_type_are_numbers_and_digits_that_are_cut_off_are_nearl
         ("4.1", (1600, 82), "Of your 2 numbers these are right: [2]"),
         ("4.5", 0.54, "factor of two"),
         ("4.5", np.sqrt(5.1), "the value of `sqrt(k_1 * k_2)`"),
+        ("5.1", 23 / 107, "you divide by `load - pull`"),
         ("5.2", np.hypot(4.92, 9.45), "the sides of a right angle"),
         ("5.2", 18.9, "The runner on ice holds something as well. Besides, it is twice as large"),
         ("5.4", 0.2445, "A square is missing"),

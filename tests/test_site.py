@@ -25,11 +25,6 @@ HOW_TOS = {*PAGES, "your_own_mesh"}
 LIMIT = 900.0  # s: three minutes on two idle cores, more where other tests run
 
 
-def BUILDS(test):
-    """A slow test of the built site: one worker builds it for all of them."""
-    return pytest.mark.slow(pytest.mark.xdist_group("site")(test))
-
-
 @pytest.fixture(scope="module")
 def titles() -> dict[str, str]:
     """Name and title of the reports that are there before the build."""
@@ -77,7 +72,7 @@ def letters(html: str) -> str:
     return re.sub(r"\W", "", unescape(re.sub("<.*?>", "", html)))
 
 
-@BUILDS
+@pytest.mark.slow
 def test_every_method_and_public_name_has_its_place(built):
     listed = (built / "generated" / "methods.html").read_text()
     for name, (_, _, what) in METHODS.items():
@@ -98,7 +93,7 @@ def test_every_method_and_public_name_has_its_place(built):
             )
 
 
-@BUILDS
+@pytest.mark.slow
 def test_tutorials_and_chapters_were_executed_and_their_slider_is_there(built):
     for path in (ROOT / "experiments" / "tutorials").glob("*.py"):
         page = (built / "generated" / "tutorials" / f"{path.stem}.html").read_text()
@@ -110,7 +105,7 @@ def test_tutorials_and_chapters_were_executed_and_their_slider_is_there(built):
     )
 
 
-@BUILDS
+@pytest.mark.slow
 def test_reports_are_included(built, titles):
     text = "".join(
         (built / "generated" / f"{page}.html").read_text() for page in ("accuracy", "performance")
@@ -123,7 +118,7 @@ def test_reports_are_included(built, titles):
         )
 
 
-@BUILDS
+@pytest.mark.slow
 def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(built):
     for path, text in pages(built).items():
         for tag, target in re.findall(r'<(\w+)[^>]*?\s(?:href|src)="([^"#][^"]*)"', text):
@@ -146,7 +141,7 @@ FITS = """all.map((slide, k) => {
 })"""
 
 
-@BUILDS
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to open the slides with")
 def test_slides_fit_and_their_formulas_and_figures_are_drawn(built):
     files = sorted((built / "lectures").glob("*.html"))
@@ -169,7 +164,7 @@ def test_slides_fit_and_their_formulas_and_figures_are_drawn(built):
 FIRST = "document.querySelector('#search-results li > a')?.getAttribute('href')"
 
 
-@BUILDS
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium to search with")
 @pytest.mark.parametrize("subject", ["certificate", "preconditioner", "mortar", "penalty"])
 def test_search_finds_a_subject_before_the_symbols(subject, built):

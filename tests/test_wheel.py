@@ -66,12 +66,7 @@ def plain(wheel, tmp_path_factory) -> Path:
     return environment(tmp_path_factory.mktemp("plain") / "venv", wheel)
 
 
-def INSTALLS(test):
-    """A slow test of the wheel: one worker builds and installs it for all of them."""
-    return pytest.mark.slow(pytest.mark.xdist_group("wheel")(test))
-
-
-@INSTALLS
+@pytest.mark.slow
 def test_it_holds_the_package_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     modules = {str(p.relative_to(ROOT)) for p in ROOT.joinpath("contactopt").rglob("*.py")}
@@ -83,7 +78,7 @@ def test_it_holds_the_package_and_nothing_else(wheel):
     assert {name.split("/")[0].split("-")[0] for name in names} == {"contactopt"}
 
 
-@INSTALLS
+@pytest.mark.slow
 def test_it_installs_and_runs_in_an_empty_environment(wheel, plain, tmp_path):
     binaries = plain.parent
     assert "punch-2d" in run(binaries / "contactopt", "list", cwd=tmp_path)
@@ -168,7 +163,7 @@ INTO_DOCS = ("experiments", "reports", "pyproject.toml", "LICENSE")
 INTO_DOCS += ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 
 
-@INSTALLS
+@pytest.mark.slow
 @pytest.mark.parametrize("extra", [*TRIED, "docs"])
 def test_each_extra_alone_does_what_it_is_for(wheel, plain, tmp_path, extra):
     python = environment(tmp_path / "venv", f"{wheel}[{extra}]", beneath=plain)

@@ -8,8 +8,9 @@ proximal loop.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
    circle near a solution, a few proximal steps break out of it.
-2. Where Q is sparse and singular: the proximal loop, as long as its subproblems are easy and each
-   of them halves the residual.
+2. Where Q is sparse and singular: the sweeps of stage 0 from no force again, each of them
+   accelerated, since packings on which one of the two goes round in a circle seldom stop the other.
+   Then the proximal loop, as long as its subproblems are easy and each of them halves the residual.
 3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
@@ -194,6 +195,9 @@ class _Robust:
         if self.loose and start is not None:
             reached = yield from self.proximal(start, constants.POLISH, constants.LEAST_ALPHA)
         elif self.loose:
+            self.swept.r[:] = 0.0
+            again = constants.FIRST_SWEEPS, constants.MORE_BETWEEN
+            yield from self.swept.points(*again, constants.SWEEPING)
             reached = yield from self.proximal(reached, 1, constants.EAGER_ALPHA, "eager")
         else:
             residual = coulomb_equations(problem).evaluate(*reached)[0]

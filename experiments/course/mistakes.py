@@ -313,8 +313,9 @@ def _changed_operation(
                 inverse = ast.BinOp(ast.Constant(1.0), ast.Div(), right)
                 yield inverse, f"the factor `{first}` is left out"
                 yield ast.BinOp(inverse, ast.Div(), left), WRONG_SIDE.format(first)
-            both = ast.BinOp(left, ast.Add(), right)
+            both, rest = ast.BinOp(left, ast.Add(), right), ast.BinOp(right, ast.Sub(), left)
             yield ast.BinOp(left, op, both), f"you divide by `{first} + {second}`"
+            yield ast.BinOp(left, op, rest), f"you divide by `{second} - {first}`"
         case ast.Pow():
             yield left, f"the exponent `{second}` of `{first}` is left out"
             yield (

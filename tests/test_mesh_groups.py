@@ -1,0 +1,331 @@
+"""Bodies, sets and sides of files of Abaqus, CalculiX and Exodus keep their names."""
+
+import meshio
+import numpy as np
+import pytest
+import skfem
+import skfem.io.meshio
+
+from contactopt import InputError, load_mesh
+from contactopt.meshes.mesh_files import load_bodies
+from tests.mesh_samples import SQUARE, TWO, flux, volume, write
+
+
+def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
+    path = write(
+        tmp_path / "a.inp",
+        SQUARE,
+        [("quad", TWO)],
+        point_sets={"floor": np.array([0, 1, 2]), "corner": np.array([0])},
+        cell_sets={"left": [np.array([0])], "right": [np.array([1])]},
+    )
+    whole, left = load_mesh(path), load_mesh(path, "left")
+    assert whole.nelements == 2 and left.nelements == 1
+    assert (
+        set(whole.boundaries) == {"floor"}
+        and len(whole.boundaries["floor"]) == 2
+        and len(left.boundaries["floor"]) == 1
+    )
+    tags = {"gmsh:physical": [np.array([3, 4])]}
+    path = write(
+        tmp_path / "a.vtu", SQUARE, [("quad", TWO)], cell_data={"part": [np.array([3, 4])]}
+    )
+    assert load_mesh(path, "part=4").p[0].min() == 1
+    both = meshio.Mesh(
+        SQUARE, [("quad", TWO)], cell_data=tags | {"gmsh:geometrical": tags["gmsh:physical"]}
+    )
+    path = tmp_path / "a.msh"
+    meshio.write(path, both, file_format="gmsh22")
+    assert load_mesh(path, "4").p[0].min() == 1
+
+
+TWO_BODIES = """*Heading
+** two bricks, each with its own block of nodes, as CalculiX takes them
+*NODE, NSET=NLOW
+{low}
+*ELEMENT, TYPE=C3D20R, ELSET=LOW
+1,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,
+16,17,18,19,20
+*Node
+{up}
+*Element, type=c3d20r, elset=up
+ 7,101,102,103,104,105,106,107,108,109,110,111,112,113,114,115,
+116,117,118,119,120
+*ELEMENT, TYPE=SPRINGA, ELSET=SPRINGS
+9, 1, 101
+*NSET, NSET=FLOOR
+1, 2, 3, 4,
+*NSET, NSET=RANGE, GENERATE
+5, 8, 1
+*NSET, NSET=BOTH
+FLOOR, range, 101
+*ELSET, ELSET=ALL
+LOW, up
+*SURFACE, NAME=TOUCH
+up, S1
+LOW, S2
+*STEP
+*NODE PRINT, NSET=FLOOR
+U
+*END STEP
+"""
+
+
+def brick_of_twenty(height, first):
+    """Lines of the nodes of a brick of second order, numbered from `first`."""
+    corners = np.array(
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]]
+    )
+    edges = [
+        (0, 1),
+        (1, 2),
+        (2, 3),
+        (3, 0),
+        (4, 5),
+        (5, 6),
+        (6, 7),
+        (7, 4),
+        (0, 4),
+        (1, 5),
+        (2, 6),
+        (3, 7),
+    ]
+    places = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in edges]])
+    return "\n".join(f"{first + i}, {x}, {y}, {z + height}" for i, (x, y, z) in enumerate(places))
+
+
+def test_two_bodies_of_calculix_with_their_own_nodes_sets_and_surfaces(tmp_path):
+    (tmp_path / "nodes.inc").write_text("*NODE\n" + brick_of_twenty(1.0, 101) + "\n")
+    text = TWO_BODIES.format(low=brick_of_twenty(0.0, 1), up=brick_of_twenty(1.0, 101))
+    included = text.replace("*Node\n" + brick_of_twenty(1.0, 101), "*INCLUDE, INPUT=nodes.inc")
+    for content in (text, included):
+        (tmp_path / "two.inp").write_text(content)
+        low, up = load_mesh(tmp_path / "two.inp", "LOW"), load_mesh(tmp_path / "two.inp", "up")
+        for mesh, z in ((low, 0), (up, 1)):
+            assert type(mesh) is skfem.MeshHex2 and volume(mesh) == pytest.approx(1.0)
+            assert (mesh.p[2].min(), mesh.p[2].max()) == (z, z + 1)
+            assert flux(mesh, "TOUCH") == pytest.approx(1 - 2 * z)
+        assert flux(low, "FLOOR") == pytest.approx(0) and flux(low, "RANGE") == pytest.approx(1)
+        assert len(low.boundaries["BOTH"]) == 6 and "FLOOR" not in up.boundaries
+    for old, new, words in (
+        ("101,102", "999,102", "names a node that is not there"),
+        ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "line 25: an element C3D20R lacks"),
+        ("*Heading", "*INCLUDE, INPUT=two.inp", "include each other"),
+        ("TYPE=C3D20", "TYPE=C3D21", "elements of type C3D21R are not known"),
+        ("up, S1", "upper, S1", "there is no set upper of elements"),
+        ("FLOOR, range", "FLOOR, RANGES", "there is no set RANGES of nodes"),
+    ):
+        (tmp_path / "two.inp").write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=words):
+            load_mesh(tmp_path / "two.inp", "LOW")
+
+
+ASSEMBLY = """*Heading
+*Part, name=Brick
+*Node
+{brick}
+*Element, type=C3D20, elset=All
+1, 1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,
+16,17,18,19,20
+*Nset, nset=Under
+1, 2, 3, 4
+*Elset, elset=_Over_S2, internal
+1,
+*Surface, type=ELEMENT, name=Over
+_Over_S2, S2
+*Surface, type=ELEMENT, name=Skin
+All
+*End Part
+*Part, name=Tool
+*Surface, type=SEGMENTS, name=Rigid
+START, 0., 0.
+*End Part
+*Assembly, name=Assembly
+*Instance, name=Low, part=Brick
+*End Instance
+*Instance, name=Up, part=Brick
+ 0., 0., 3.
+ 0., 0., 3., 0., 1., 3., 90.
+*End Instance
+*Instance, name=Tool-1, part=TOOL
+*End Instance
+*Nset, nset=Foot, instance=Low
+1, 2, 3, 4
+*Nset, nset=Side, instance=Up
+Under
+*Nset, nset=Under, instance=Low
+5, 6, 7, 8
+*Elset, elset=Both
+Low.All, Up.1
+*Surface, type=ELEMENT, name=Front
+Low._Over_S2, S3
+*End Assembly
+"""
+
+
+def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
+    """The upper brick is lifted by 3 and turned by a quarter about the edge y at that height:
+    (x, y, z) goes to (z, y, 3 - x).
+    """
+    path, text = tmp_path / "two.inp", ASSEMBLY.format(brick=brick_of_twenty(0.0, 1))
+    path.write_text(text)
+    low, up = load_mesh(path, "Low"), load_mesh(path, "Up")
+    for mesh, z in ((low, 0), (up, 2)):
+        assert volume(mesh) == pytest.approx(1.0)
+        np.testing.assert_allclose(mesh.p.min(axis=1), [0, 0, z], atol=1e-12)
+        assert len(mesh.boundaries["Skin"]) == 6 and flux(mesh, "Skin") == pytest.approx(3.0)
+    assert set(low.boundaries) == {"Foot", "Under", "Low.Under", "Over", "Front", "Skin"}
+    assert set(up.boundaries) == {"Side", "Up.Under", "Over", "Skin"}
+    for mesh, name, axis, value in (
+        (low, "Foot", 2, 0.0), (low, "Low.Under", 2, 0.0), (low, "Under", 2, 1.0),
+        (low, "Over", 2, 1.0), (low, "Front", 1, 0.0),
+        (up, "Side", 0, 0.0), (up, "Up.Under", 0, 0.0), (up, "Over", 0, 1.0),
+    ):  # fmt: skip
+        corners = mesh.p[axis, mesh.facets[:, mesh.boundaries[name]]]
+        np.testing.assert_allclose(corners, value, atol=1e-12)
+    for old, new, words in (
+        ("Low.All, Up.1", "Low.All, Up.None", "there is no set None of elements"),
+        ("instance=Low", "instance=Lowest", "there is no instance Lowest"),
+        ("part=TOOL", "part=Toll", "is of part Toll, which is not above; parts: brick, tool"),
+    ):
+        path.write_text(text.replace(old, new))
+        with pytest.raises(InputError, match=words):
+            load_mesh(path, "Low")
+    path.write_text(text)
+    with pytest.raises(InputError, match="no group 'Tool-1'; its groups of elements are Low, Up"):
+        load_mesh(path, "Tool-1")
+    with pytest.raises(InputError, match="falls into 2 pieces"):
+        load_mesh(path, "Both")
+    bodies, refused = load_bodies(path)
+    assert set(bodies) == {"Low", "Up"} and len(refused) == 3
+    assert any("'Both' is the same as" in told or "same as 'Both'" in told for told in refused)
+
+
+def test_sets_of_the_elements_of_a_body_are_no_bodies(tmp_path):
+    """Abaqus writes an internal set of elements for each surface. A set of all elements of two
+    bodies is none either, and hides none.
+    """
+    path = tmp_path / "strip.inp"
+    nodes = "\n".join(f"{i + 3 * j + 1}, {i}, {j}" for j in range(2) for i in range(3))
+    path.write_text(
+        f"*Node\n{nodes}\n11, 5, 0\n12, 6, 0\n13, 6, 1\n14, 5, 1\n"
+        "*Element, type=CPE4, elset=Strip\n1, 1, 2, 5, 4\n2, 2, 3, 6, 5\n"
+        "*Element, type=CPE4, elset=Block\n3, 11, 12, 13, 14\n*Elset, elset=All\n1, 2, 3\n"
+        "*Elset, elset=_Over_S3, internal\n2\n*Surface, type=ELEMENT, name=Over\n_Over_S3, S3\n"
+    )
+    bodies, refused = load_bodies(path)
+    assert list(bodies) == ["Strip", "Block"] and set(bodies["Strip"].boundaries) == {"Over"}
+    assert "group '_Over_S3' is a part of 'Strip'" in refused and len(refused) == 2
+
+
+def exodus_bricks(path, hdf5):
+    """Two bricks of twenty nodes, one on the other, and a tetrahedron beside them."""
+    places = np.array([
+        [float(word) for word in line.split(",")[1:]]
+        for z in (0.0, 1.0) for line in brick_of_twenty(z, 1).splitlines()
+    ])  # fmt: skip
+    corners = np.array([[5, 0, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1.0]])
+    # edges: those below, those along the third axis, those above
+    order = np.array([*range(12), 16, 17, 18, 19, 12, 13, 14, 15]) + 1
+    letters = np.zeros((3, 8), dtype="S1")
+    for row, name in zip(letters, ("low", "up", "tip")):
+        row[: len(name)] = list(name)
+    values = {
+        "coordx": np.append(places[:, 0], corners[:, 0]),
+        "coordy": np.append(places[:, 1], corners[:, 1]),
+        "coordz": np.append(places[:, 2], corners[:, 2]),
+        "eb_prop1": np.array([10, 20, 30]), "eb_names": letters,
+        "connect1": order[None], "connect2": order[None] + 20,
+        "connect3": np.array([[41, 42, 43, 44]]),
+        "ss_prop1": np.arange(1, 7),
+        **{f"elem_ss{k}": np.array([1, 2, 3][: 3 if k < 5 else 2]) for k in range(1, 7)},
+        **{f"side_ss{k}": np.full(3 if k < 5 else 2, k) for k in range(1, 7)},
+        "ns_prop1": np.array([7]), "node_ns1": np.array([1, 2, 3, 4]),
+    }  # fmt: skip
+    kinds = {"connect1": "HEX20", "connect2": "HEX20", "connect3": "TETRA4"}
+    if hdf5:
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            for name, value in values.items():
+                file[name] = value
+            for name, kind in kinds.items():
+                file[name].attrs["elem_type"] = np.bytes_(kind)
+        return
+    from scipy.io import netcdf_file
+
+    with netcdf_file(path, "w") as file:
+        for name, value in values.items():
+            lengths = tuple(f"{name}_{axis}" for axis in range(value.ndim))
+            for length, size in zip(lengths, value.shape):
+                file.createDimension(length, size)
+            value = value if value.dtype.kind != "i" else value.astype("i4")
+            file.createVariable(name, value.dtype, lengths)[:] = value
+        for name, kind in kinds.items():
+            file.variables[name].elem_type = kind
+
+
+@pytest.mark.parametrize("hdf5", [False, True])
+def test_exodus_files_keep_the_names_of_blocks_and_their_side_sets(tmp_path, hdf5):
+    path = tmp_path / "bricks.exo"
+    exodus_bricks(path, hdf5)
+    low, up, tip = (load_mesh(path, name) for name in ("low", "up", "tip"))
+    assert type(up) is skfem.MeshHex2 and type(tip) is skfem.MeshTet1
+    for mesh, size in ((low, 1.0), (up, 1.0), (tip, 1 / 6)):
+        assert volume(mesh) == pytest.approx(size) and flux(mesh) == pytest.approx(3 * size)
+    # of a brick: (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (1, 5, 8, 4), (1, 4, 3, 2), (5, 6, 7, 8)
+    for side, (axis, value) in enumerate(((1, 0), (0, 1), (1, 1), (0, 0), (2, 0), (2, 1)), 1):
+        for mesh, z in ((low, 0), (up, 1)):
+            corners = mesh.p[:, mesh.facets[:, mesh.boundaries[f"side {side}"]]]
+            assert corners.shape[2] == 1
+            np.testing.assert_allclose(corners[axis], value + (z if axis == 2 else 0), atol=1e-12)
+    for side, axis in ((1, 1), (3, 0), (4, 2)):  # of a tetrahedron; its second side is oblique
+        corners = tip.p[:, tip.facets[:, tip.boundaries[f"side {side}"]]]
+        np.testing.assert_allclose(corners[axis], 5.0 if axis == 0 else 0.0, atol=1e-12)
+    assert set(low.boundaries) == {"nodes 7", *(f"side {k}" for k in range(1, 7))}
+    with pytest.raises(InputError, match="its groups of elements are low, up, tip"):
+        load_mesh(path, "middle")
+    path.write_bytes(path.read_bytes()[: 400 if not hdf5 else 1000])
+    with pytest.raises(InputError, match="cannot be read as exodus"):
+        load_mesh(path)
+
+
+def test_exodus_blocks_and_sides_that_are_not_known_are_refused(tmp_path):
+    """What a file names is read or refused; shells on a brick are a surface of it."""
+    h5py = pytest.importorskip("h5py")
+
+    def change(**values):
+        exodus_bricks(tmp_path / "a.exo", True)
+        with h5py.File(tmp_path / "a.exo", "a") as file:
+            for name, (value, kind) in values.items():
+                if name in file:
+                    del file[name]
+                file[name] = np.array(value)
+                if kind:
+                    file[name].attrs["elem_type"] = np.bytes_(kind)
+        return load_mesh(tmp_path / "a.exo", "low")
+
+    for values in (
+        {"connect3": ([[41, 42, 43, 44]], "NSIDED")}, {"side_ss1": ([1, 7, 1], "")},
+        {"elem_ss1": ([1, 2, 4], "")}, {"node_ns1": ([1, 2, 99], "")},
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=r"not known|not there"):
+            change(**values)
+    low = change(connect3=([[1, 2, 3, 4]], "SHELL4"), elem_ss1=([3], ""), side_ss1=([2], ""))
+    assert len(low.boundaries["tip"]) == len(low.boundaries["side 1"]) == 1
+    assert flux(low, "tip") == pytest.approx(0) and volume(low) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("kind,count", [("CAX8R", 8), ("CPE4", 4), ("CPS6", 6), ("CAX3", 3)])
+def test_plane_elements_of_calculix(tmp_path, kind, count):
+    corners = [[1, 0], [2, 0], [2, 1], [1, 1]] if count in (4, 8) else [[1, 0], [2, 0], [1, 1]]
+    places = np.array(corners, dtype=float)
+    if count in (6, 8):
+        places = np.concatenate([places, (places + np.roll(places, -1, axis=0)) / 2])
+    lines = [f"{10 * i + 10}, {x}, {y}" for i, (x, y) in enumerate(places)]
+    names = ", ".join(str(10 * i + 10) for i in range(count))
+    text = "\n".join(
+        ["*NODE", *lines, f"*ELEMENT, TYPE={kind}", f"3, {names}", "*SURFACE, NAME=LOW", "3, S1"]
+    )
+    (tmp_path / "a.inp").write_text(text)
+    mesh = load_mesh(tmp_path / "a.inp")
+    assert volume(mesh) == pytest.approx(1 if count in (4, 8) else 0.5)
+    assert np.all(mesh.p[1, mesh.facets[:, mesh.boundaries["LOW"]]] == 0)
