@@ -12,7 +12,9 @@ from conftest import MATERIAL, block, two_blocks
 
 import contactopt
 from contactopt import Contact, InputError, Part, Plate, Scene, Support, Traction, run
+from contactopt.bodies.assembled import Guides
 from contactopt.checks import place_words
+from contactopt.coupling.planes_of_symmetry import mirror_planes
 from contactopt.coupling.posed import posed
 from contactopt.figures import scene_check
 from contactopt.outcome import summary_rows
@@ -72,6 +74,15 @@ def test_images_without_a_plane_are_said_so(monkeypatch):
     monkeypatch.setattr(scene_check, "posed", lambda scene: posed(scene)._replace(planes=()))
     text = scene_check.check_scene([make_scene("punch-2d", elements=4)]).text
     assert "copies = 2, but 0 planes of symmetry are found" in text
+
+
+@pytest.mark.parametrize("guided, found", [((), [[1, 0]]), (((1, -45.0, 1.0),), [])])
+def test_of_more_planes_than_images_those_count_that_guide_all_bodies(guided, found):
+    """A floor under one body is none; two that guide both bodies are one too many."""
+    root = Guides(np.array([[0.0, 12.0], [-45.0, 12.0]]), ((0, 0.0, 1.0), *guided))
+    disc = Guides(np.array([[0.0, 30.0], [-45.0, 2.0]]), ((0, 0.0, 1.0), (1, -45.0, 1.0)))
+    planes = mirror_planes(make_scene("punch-2d", elements=4), [root, disc], [])
+    assert [plane.inward.tolist() for plane in planes] == found
 
 
 KINDS = {name.partition(":")[0].partition("@")[0] for name in (*ROWS, *PLACED)}

@@ -89,8 +89,9 @@ def mirror_planes(
 ) -> tuple[SymmetryPlane, ...]:
     """The planes of symmetry, one for each direction, of a scene with two copies or more: those
     `cutting` a contact surface, those of the axes that the scene names, and those on which supports
-    guide a body and which have all bodies on one side, unless there are more of these than the
-    copies ask for. InputError if no such plane lies across an axis that the scene names.
+    guide a body and which have all bodies on one side. If there are more of these than the copies
+    ask for, as a floor on which one body stands, those count that guide every body.
+    InputError if no such plane lies across an axis that the scene names.
     """
     found: list[SymmetryPlane] = []
     for plane in cutting:
@@ -112,7 +113,21 @@ def mirror_planes(
                 " plane of symmetry."
             )
     every = (*found, *spare.values())
+    if 2 ** len(every) > scene.copies:
+        every = (*found, *(plane for plane in spare.values() if _guides_all(plane, guides)))
     return every if 2 ** len(every) <= scene.copies else tuple(found)
+
+
+def _guides_all(plane: SymmetryPlane, guides: Sequence[Guides]) -> bool:
+    """Whether a plane is one of those that guide each body."""
+    size = max(float(np.abs(own.extent).max()) for own in guides)
+    return all(
+        any(
+            side * plane.inward[axis] > 0.5 and abs(side * place - plane.offset) <= EQUAL * size
+            for axis, place, side in own.planes
+        )
+        for own in guides
+    )
 
 
 def _guiding(guides: Sequence[Guides], dim: int) -> dict[int, SymmetryPlane]:

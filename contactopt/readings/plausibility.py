@@ -75,8 +75,9 @@ def _missing_planes(scene: Scene, planes: Sequence[SymmetryPlane]) -> list[str]:
     return [
         f"copies = {scene.copies}, but {count(len(planes), 'plane')} of symmetry"
         f" {'is' if len(planes) == 1 else 'are'} found, which makes {2 ** len(planes)}: all forces"
-        f" are those of {scene.copies} bodies together; drop copies, or hold the bodies in each"
-        " plane of symmetry along its normal alone."
+        f" are those of {scene.copies} bodies together; drop copies, hold the bodies in each plane"
+        " of symmetry along its normal alone, or name the axes across which the planes lie, as in"
+        f' mirror = "{scene.components[0]}".'
     ]
 
 
