@@ -84,7 +84,7 @@ def test_a_row_of_a_wrong_type_costs_only_itself(campaign, tmp_path, caplog, kin
         found = load(path)
     assert list(found["key"]) == list(table["key"].drop(index=2))
     place = "line 4" if kind == "csv" else "row 3"
-    assert f"'{path}', {place}: the row has no '{column}'" in caplog.text
+    assert f"'{path}', {place}: its '{column}' is not " in caplog.text
     pd.testing.assert_series_equal(found["residual"], load(campaign)["residual"].drop(index=2)
                                    .reset_index(drop=True), rtol=1e-5)  # fmt: skip
 

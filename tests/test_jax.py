@@ -120,7 +120,7 @@ def test_bad_input_gets_a_sentence():
         solve(Q, q.ravel(), mu)
     with pytest.raises(Exception, match="shape"):
         solve(Q[:3], q, mu)
-    with pytest.raises(contactopt.InputError, match="needs 1 numbers"):
+    with pytest.raises(contactopt.InputError, match="needs 1 number,"):
         quantity("punch-2d", "pressure", "mu")(jnp.zeros(2))
     with pytest.raises(contactopt.InputError, match="colour"):
         quantity("punch-2d", "pressure", "colour")
