@@ -62,7 +62,7 @@ def lives(number: int) -> bool:
 @pytest.mark.slow
 def test_killed_processes_cost_their_own_run_only(tmp_path):
     """SIGKILL to the processes that run methods, then to the whole campaign, at random moments."""
-    path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 30")), tmp_path / "out"
+    path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 15")), tmp_path / "out"
     expected = read_experiment(path).runs()
     rng = np.random.default_rng(5)
     command = bench(path, out, "--resume")

@@ -28,6 +28,7 @@ from contactopt.bodies.elements import make_basis
 from contactopt.errors import InputError
 from contactopt.meshes.given_curves import Curve
 from contactopt.methods import exchanged
+from contactopt.problem.chart import Pair
 
 E, NU = 1e4, 0.3
 STRESS = {2: np.array([-0.6, -1.0]), 3: np.array([-0.6, -0.3, -1.0])}
@@ -147,6 +148,19 @@ def test_an_exchange_is_felt_alike_by_displacements_and_by_balance(felt, moved, 
     problem = InterfaceProblem(1e-5 * Q, np.zeros((2, 2)), mu=0.5, V=V[:, None], s=[-1.0])
     unfelt = exchanged.exchanges(problem, np.arange(2))[1]
     assert unfelt.shape[1] == (max(felt, moved) < 1e-10)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_contacts_at_one_place_bear_alike_also_those_that_bore_nothing(share):
+    """Two contacts of one normal, of which only the sum of the forces is felt."""
+    chart = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3).chart
+    pairs = Pair("a", 0, 1, chart), Pair("b", 1, 2, chart)
+    Q = np.eye(4) + np.eye(4, k=2) * [0, 0, 1, 0] + np.eye(4, k=-2) * [1, 0, 0, 0]
+    q, at = np.array([[-1.0, 0.0]] * 2), np.zeros((2, 2))
+    problem = InterfaceProblem(Q, q, 0.3, pairs=pairs, coordinates=at)
+    given = replace(solve(problem), reactions=np.array([[share, 0.0], [1 - share, 0.0]]))
+    found = exchanged.least_friction(problem, given, 1e-8)
+    assert np.allclose(found.reactions, [[0.5, 0.0]] * 2) and found.residual < 1e-12
 
 
 def test_a_seat_whose_forces_have_the_least_friction_is_not_said_to_be_far_off():

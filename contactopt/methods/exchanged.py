@@ -99,7 +99,7 @@ def _exchanged(
     some, at the contacts `at`, or several solutions.
     """
     left = EMPTY
-    for contacts in _closed(problem, solution.reactions, near):
+    for contacts in _closed(problem, solution, near):
         own, unfelt = exchanges(problem, contacts)
         if not unfelt.size:  # nor do fewer of them exchange any
             return solution, left
@@ -142,14 +142,20 @@ def _unfelt(felt: np.ndarray) -> np.ndarray:
     return directions[small].T
 
 
-def _closed(problem: InterfaceProblem, r: np.ndarray, at: np.ndarray) -> Iterator[np.ndarray]:
-    """Of some contacts those that are pressed, then of these those within friction."""
-    normal = np.where(problem.law.lowest < 0, np.inf, r[:, 0])[at]
-    pressed = at[normal > INSIDE * np.abs(r[:, 0]).max()]
-    yield pressed
-    bound = (1 - INSIDE) * problem.law.bound(r[:, 0])
-    inside = np.linalg.norm(r[:, 1:], axis=1) < bound
-    yield pressed[(inside | ~problem.law.rough)[pressed]]
+def _closed(problem: InterfaceProblem, solution: Solution, at: np.ndarray) -> Iterator[np.ndarray]:
+    """Of some contacts those without a gap, then of these those that are pressed, then of these
+    those within friction.
+    """
+    r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
+    bound = problem.law.lowest < 0
+    normal = np.where(bound, np.inf, r[:, 0])
+    closed = (u[:, 0] <= INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())) | bound
+    pressed = normal > INSIDE * np.abs(r[:, 0]).max()
+    inside = np.linalg.norm(r[:, 1:], axis=1) < (1 - INSIDE) * problem.law.bound(r[:, 0])
+    inside = pressed & (inside | ~problem.law.rough)
+    for one, before in ((closed | pressed, None), (pressed, closed | pressed), (inside, pressed)):
+        if before is None or not np.array_equal(one[at], before[at]):
+            yield at[one[at]]
 
 
 def _with_least(
