@@ -134,7 +134,7 @@ class Painter {
     return {places, cells, from};
   }
 
-  end([left, right, top, bottom]) {  // shows the picture within these limits; from here the context draws in pixels of the page
+  end([left, right, top, bottom]) {  // shows the picture within these limits; then the context draws in pixels
     this.resolve();
     this.context.setTransform(1, 0, 0, 1, 0, 0);
     this.context.fillStyle = "#fff";
