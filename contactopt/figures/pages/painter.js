@@ -56,8 +56,8 @@ class Painter {
     return made;
   }
 
-  // Triangles coloured by values between low and high; of `sheer` ones a quarter of the pixels. `first` is the number of the first one for `owner`.
-  triangles([px, py, pz], cells, values, {table, low, high, lit = true, sheer = false, towards = 0, first = 0}) {
+  // Triangles coloured by values between low and high; of `sheer` ones a quarter of the pixels, `bare` ones fade to nothing. `first` is the number of the first one for `owner`.
+  triangles([px, py, pz], cells, values, {table, low, high, lit = true, sheer = false, bare = false, towards = 0, first = 0}) {
     const {width, height, depth, pixels, owner} = this, step = 255 / (high - low);
     for (let t = 0; t < cells.length; t += 3) {
       const a = cells[t], b = cells[t + 1], c = cells[t + 2], ax = px[a], ay = py[a], az = pz[a] + towards;
@@ -79,6 +79,7 @@ class Painter {
           const across = x + 0.5 - ax, z = az + zx * across + zy * down;
           if (z <= depth[k] || (sheer && (x | y) & 1)) continue;
           const v = av + vx * across + vy * down, n = 3 * (v > 0 ? (v < 255 ? Math.round(v) : 255) : 0);
+          if (bare && v < 6 + 12 * (x & 1) + 6 * (y & 1)) continue;
           depth[k] = z;
           owner[k] = first + t / 3;
           pixels[k] = v === v ? 0xff000000 | ((table[n + 2] * light) << 16) | ((table[n + 1] * light) << 8) | (table[n] * light) : 0xff999999;
@@ -87,7 +88,7 @@ class Painter {
     }
   }
 
-  lines([px, py, pz], pairs, grey, thick, towards = 2) {  // a little nearer to the eye than the surface that they lie on
+  lines([px, py, pz], pairs, grey, thick) {  // a little nearer than the surface that they lie on
     const {width, height, depth, pixels} = this, colour = 0xff000000 | (grey << 16) | (grey << 8) | grey, wide = Math.max(1, Math.round(thick * this.dense));
     for (let i = 0; i < pairs.length; i += 2) {
       const a = pairs[i], b = pairs[i + 1], dx = px[b] - px[a], dy = py[b] - py[a], dz = pz[b] - pz[a];
@@ -99,10 +100,10 @@ class Painter {
       if (!(low <= high)) continue;
       const steps = Math.max(1, Math.ceil((high - low) * Math.max(Math.abs(dx), Math.abs(dy))));
       for (let n = 0; n <= steps; n++) {
-        const s = low + ((high - low) * n) / steps, x0 = Math.floor(px[a] + s * dx - (wide - 1) / 2), y0 = Math.floor(py[a] + s * dy - (wide - 1) / 2), z = pz[a] + s * dz + towards;
+        const s = low + ((high - low) * n) / steps, x0 = Math.floor(px[a] + s * dx - (wide - 1) / 2), y0 = Math.floor(py[a] + s * dy - (wide - 1) / 2), z = pz[a] + s * dz;
         for (let y = Math.max(0, y0); y < Math.min(height, y0 + wide); y++) for (let x = Math.max(0, x0); x < Math.min(width, x0 + wide); x++) {
           const k = y * width + x;
-          if (z > depth[k]) { depth[k] = z - towards; pixels[k] = colour; }
+          if (z + 2 > depth[k]) { depth[k] = z; pixels[k] = colour; }
         }
       }
     }
@@ -123,7 +124,7 @@ class Painter {
     }
   }
 
-  ribbon([px, py, pz], pairs, wide) {  // lines in the plane as triangles: their places, corners, and the node behind each corner
+  ribbon([px, py, pz], pairs, wide) {  // lines in the plane as triangles: places, corners, the node behind each
     const many = pairs.length / 2, places = [0, 1, 2].map(() => new Float64Array(4 * many)), cells = [], from = [];
     for (let i = 0; i < many; i++) {
       const [a, b] = [pairs[2 * i], pairs[2 * i + 1]], dx = px[b] - px[a], dy = py[b] - py[a], half = (wide * this.dense) / 2 / (Math.hypot(dx, dy) || 1);
@@ -133,7 +134,7 @@ class Painter {
     return {places, cells, from};
   }
 
-  end([left, right, top, bottom]) {  // shows the picture within these limits; from here the context draws in pixels of the page
+  end([left, right, top, bottom]) {  // shows the picture within these limits; then the context draws in pixels
     this.resolve();
     this.context.setTransform(1, 0, 0, 1, 0, 0);
     this.context.fillStyle = "#fff";

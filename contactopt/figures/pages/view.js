@@ -47,7 +47,7 @@ function sign(name, image) {  // by which a component changes in an image; those
   return image.reduce((found, [axis]) => found * ([...letters].filter((letter) => letter === data.axes[axis]).length % 2 ? -1 : 1), 1);
 }
 
-function placed(item) {  // places of the nodes of all images shown, one image after the other
+function placed(item) {  // nodes of all images shown, one after the other
   const length = count(item), dim = data.dim, move = at(item.move, dim * length), more = Math.max(0, now.scale - 1), all = shownImages(), xyz = [0, 1, 2].map(() => new Float32Array(length * all.length));
   all.forEach((image, k) => {
     for (let c = 0; c < 3; c++) {
@@ -60,7 +60,7 @@ function placed(item) {  // places of the nodes of all images shown, one image a
 
 const whole = (item, name) => (now.whole ? item[name] : Int32Array.from([...item[name], ...item[`cut_${name}`]]));  // with what lies in the planes of symmetry
 
-function imaged(numbers, change) {  // those of all images shown, one image after the other: factor * number + shift
+function imaged(numbers, change) {  // those of all images: factor * number + shift
   const all = shownImages(), many = numbers.length, made = new numbers.constructor(many * all.length);
   if (all.length === 1) return numbers;
   all.forEach((image, k) => { const [factor, shift] = change(image, k); for (let i = 0; i < many; i++) made[k * many + i] = factor * numbers[i] + shift; });
@@ -166,11 +166,11 @@ function paintBody(body, colours) {
 }
 
 function paintContact(pair, colours) {
-  const shape = shaped(pair, [state(pair, now.contact)]), places = painter.places(shape.xyz), meta = {contact: contacts.indexOf(pair), from: shape.from, places};
+  const shape = shaped(pair, [state(pair, now.contact)]), places = painter.places(shape.xyz), meta = {contact: contacts.indexOf(pair), from: shape.from, places}, look = {lit: false, bare: now.contact === "pressure"};
   if (pair.lines?.length) {
     const {places: corners, cells, from} = painter.ribbon(places, shape.lines(pair.lines), 8);
-    painter.triangles(corners, cells, from.map((node) => shape.values[node]), {...colours, lit: false, towards: 7, first: own(pair, {...meta, places: corners, from}, cells)});
-  } else if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, lit: false, towards: painter.dense, first: own(pair, meta, shape.cells)});
+    painter.triangles(corners, cells, from.map((node) => shape.values[node]), {...colours, ...look, towards: 7, first: own(pair, {...meta, places: corners, from}, cells)});
+  } else if (pair.cells.length) painter.triangles(places, shape.cells, shape.values, {...colours, ...look, towards: painter.dense, first: own(pair, meta, shape.cells)});
   else painter.dots(places, shape.values, 3, {...colours, first: own(pair, meta)});
 }
 
@@ -363,18 +363,18 @@ function requestDraw() {  // at once as it moves, and in full when it rests
   requestAnimationFrame(() => { asked = false; draw(true); });
 }
 
-function sections(pair, c) {  // a line across a surface in space through the largest pressure, along one of the two axes that lie most in the surface
-  const length = count(pair), pressure = repeated(state(pair, "pressure")), cells = numbered(whole(pair, "cells"), length), peak = pressure.reduce((best, value, i) => (value > pressure[best] ? i : best), 0) % length, force = state(pair, "vector").subarray(3 * peak);
-  const ways = [0, 1, 2].sort((a, b) => Math.abs(force[a]) - Math.abs(force[b])).slice(0, 2).sort(), [x, y] = [c, 1 - c].map((own) => placed(pair)[ways[own]]), made = {x: [], y: [], name: `along ${data.axes[ways[c]]}`};
-  const [low, high] = span([y]), level = y[peak] + 1e-4 * (y[peak] > (low + high) / 2 ? low - high : high - low);  // beside the nodes, inside the surface
-  for (let t = 0; t < cells.length; t += 3) for (let k = 0; k < 3; k++) {
-    const a = cells[t + k], b = cells[t + ((k + 1) % 3)];
-    if (y[a] > level === y[b] > level) continue;
-    const share = (level - y[a]) / (y[b] - y[a]);
-    made.x.push(x[a] + share * (x[b] - x[a])); made.y.push(pressure[a] + share * (pressure[b] - pressure[a]));
+function sections(pair, c) {  // a line through the largest pressure, along one of the two axes nearest to the surface
+  const length = count(pair), pressure = repeated(state(pair, "pressure")), cells = numbered(whole(pair, "cells"), length), peak = pressure.reduce((best, value, i) => (value > pressure[best] ? i : best), 0), force = state(pair, "vector").subarray(3 * peak);
+  const ways = [0, 1, 2].sort((a, b) => Math.abs(force[a]) - Math.abs(force[b])).slice(0, 2).sort(), [x, y] = [c, 1 - c].map((own) => placed(pair)[ways[own]]), made = {x: [], y: [], pairs: true, name: `along ${data.axes[ways[c]]}`};
+  const [low, high] = span([y]), level = y[peak] + 1e-4 * (y[peak] > (low + high) / 2 ? low - high : high - low);  // beside the nodes
+  for (let t = 0; t < cells.length; t += 3) {
+    const corners = [...cells.slice(t, t + 3)];
+    if (corners.some((node) => pressure[node] > 1e-3 * pressure[peak])) corners.forEach((a, k) => {
+      const b = corners[(k + 1) % 3], share = (level - y[a]) / (y[b] - y[a]);
+      if (y[a] > level !== y[b] > level) { made.x.push(x[a] + share * (x[b] - x[a])); made.y.push(pressure[a] + share * (pressure[b] - pressure[a])); }
+    });
   }
-  const touches = (_, i) => Math.max(made.y[i - (i % 2)], made.y[i - (i % 2) + 1]) > 1e-3 * pressure[peak];  // either end of a line
-  return {...made, x: made.x.filter(touches), y: made.y.filter(touches), pairs: true};
+  return made;
 }
 
 function drawContact() {
