@@ -22,6 +22,7 @@ from skfem import Mesh, MeshTet
 from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.errors import InputError
+from contactopt.meshes.barycentric import barycentric, frames_of
 from contactopt.meshes.bisection import bisected, uncut
 from contactopt.meshes.cells import (
     CURVED,
@@ -32,7 +33,7 @@ from contactopt.meshes.cells import (
     volumes,
 )
 from contactopt.meshes.curves import plane_curves
-from contactopt.meshes.facet_surfaces import barycentric, frames_of, space_curves
+from contactopt.meshes.facet_surfaces import space_curves
 from contactopt.meshes.given_curves import Curve
 
 log = logging.getLogger(__name__)

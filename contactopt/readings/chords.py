@@ -35,8 +35,8 @@ from skfem.refdom import RefLine, RefTri
 
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
+from contactopt.meshes.barycentric import barycentric, frames_of
 from contactopt.meshes.cells import is_curved, outer_corners
-from contactopt.meshes.facet_surfaces import barycentric, frames_of
 from contactopt.meshes.mesh_refinement import boundary_curves
 from contactopt.problem import Solution
 
