@@ -160,6 +160,12 @@ def test_cells_are_turned_and_surfaces_are_on_the_boundary():
     assert len(master) > len(slave)
 
 
+def test_a_law_without_friction_is_a_deck_without_friction():
+    scene = scenes.make_scene("punch-2d", elements=4)
+    smooth = replace(scene, mu=0.3, law="frictionless")
+    assert deck(smooth) == deck(replace(scene, mu=0.0)) != deck(replace(scene, mu=0.3))
+
+
 @pytest.mark.parametrize(
     ("name", "arguments", "words"),
     [

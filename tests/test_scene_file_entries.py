@@ -188,8 +188,8 @@ def test_any_entry_is_changed_from_the_command_line(tmp_path, capsys, monkeypatc
 
 def matches(value, rule):
     """Whether a value obeys the few keywords that the schema uses."""
-    if "anyOf" in rule:
-        return any(matches(value, way) for way in rule["anyOf"])
+    if "anyOf" in rule and not any(matches(value, way) for way in rule["anyOf"]):
+        return False
     if "enum" in rule:
         return value in rule["enum"]
     kinds = {"string": str, "number": (int, float), "integer": int, "boolean": bool}
@@ -197,9 +197,9 @@ def matches(value, rule):
     if "type" in rule and not isinstance(value, kinds[rule["type"]]):
         return False
     if isinstance(value, dict):
-        known, more = rule.get("properties", {}), rule.get("additionalProperties", True)
+        known, more = rule.get("properties", {}), rule.get("additionalProperties", {})
         return set(rule.get("required", ())) <= set(value) and all(
-            matches(own, known[key]) if key in known else more and matches(own, more)
+            matches(own, known[key]) if key in known else more is not False and matches(own, more)
             for key, own in value.items()
         )
     return not isinstance(value, list) or all(matches(one, rule.get("items", {})) for one in value)
@@ -208,7 +208,8 @@ def matches(value, rule):
 def test_the_schema_accepts_what_the_reader_accepts(tmp_path, capsys):
     assert main(["schema"]) == 0
     rule = json.loads(capsys.readouterr().out)
-    assert matches(tomllib.loads(EXAMPLE), rule) and matches(tomllib.loads(SMALL), rule)
+    smooth = SMALL.replace("mu = 0.4", 'law = "frictionless"')
+    assert all(matches(tomllib.loads(text), rule) for text in (EXAMPLE, SMALL, smooth))
     commented = [
         line[2:] for line in EXAMPLE.splitlines() if line.startswith("# ") and " = " in line
     ]
@@ -228,3 +229,16 @@ def test_the_schema_accepts_what_the_reader_accepts(tmp_path, capsys):
         SMALL.replace("nu = 0.3", "mu = 0.3"),
     ):
         assert not matches(tomllib.loads(wrong), rule), wrong
+
+
+def test_a_coefficient_that_no_law_reads_is_refused(tmp_path):
+    one = SMALL.replace("mu = 0.4", 'law = "frictionless"')
+    said = "contacts.1.mu=0.3: the law 'frictionless' reads no mu; leave it out or give 0"
+    for changes in ({"mu": 0.3}, {"contacts.1.mu": 0.3}):
+        with pytest.raises(InputError, match=said):
+            read_scene_file(written(tmp_path, one), changes)
+    with pytest.raises(InputError, match="line 19: the law 'tied' reads no mu"):
+        read_scene_file(written(tmp_path, SMALL.replace("mu = 0.4", 'law = "tied"\nmu = 0.4')))
+    rough = '[[contacts]]\nupper = "block:x+"\nlower = "floor"\nmu = 0.4\n[solve]'
+    file = read_scene_file(written(tmp_path, one.replace("[solve]", rough)), {"mu": 0.3})
+    assert [pair.mu for pair in file.states[0].contacts] == [0.0, 0.3]

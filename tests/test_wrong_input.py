@@ -86,7 +86,7 @@ def test_sizes_that_a_file_only_declares_take_no_memory(tmp_path, name):
         kind = file[f"fclib_local/{name}"].dtype
         del file[f"fclib_local/{name}"]
         file["fclib_local"].create_dataset(name, shape=(10**12,), dtype=kind, chunks=(1000,))
-    with pytest.raises(InputError, match="announces 1000000000000 numbers"):
+    with pytest.raises(InputError, match="announces more numbers, 1000000000000, than"):
         fclib.read(path)
 
 

@@ -96,9 +96,11 @@ def _check(scene: Scene) -> None:
                 " mesh of triangles or tetrahedra."
             )
     for pair in scene.pairs:
-        if not find_law(pair.law).plain_coulomb() or callable(pair.mu) or np.ndim(pair.mu) > 0:
+        law, number = find_law(pair.law), not callable(pair.mu) and np.ndim(pair.mu) == 0
+        if not (law.plain_coulomb() and number) and (law.frictional or not law.opens):
             raise InputError(
-                f"contact '{pair.name}': a deck of CalculiX takes Coulomb's law with one number mu."
+                f"contact '{pair.name}': a deck of CalculiX takes Coulomb's law with one number mu,"
+                " or no friction."
             )
 
 
@@ -216,7 +218,7 @@ def _contact(
     yield f"*SURFACE INTERACTION, NAME=LAW{number}"
     yield f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{_number(stiffness)}"
     mu: Any = pair.mu
-    if mu > 0:
+    if find_law(pair.law).frictional and mu > 0:
         yield f"*FRICTION\n{_number(float(mu))}, {_number(stiffness / 10)}"
     yield f"*CONTACT PAIR, INTERACTION=LAW{number}, TYPE=SURFACE TO SURFACE"
     yield f"SLAVE{number}, MASTER{number}"

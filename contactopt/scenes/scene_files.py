@@ -73,7 +73,9 @@ def read_scene_file(path: str | Path, changes: Mapping[str, Any] | None = None) 
         read, all_changes = read_table(path), dict(changes or {})
         if "mu" in all_changes and isinstance(read.data.get("contacts"), list):
             mu = all_changes.pop("mu")
-            numbers = range(1, len(read.data["contacts"]) + 1)
+            contacts = read.data["contacts"]
+            rough = [i for i, own in enumerate(contacts, 1) if _rubs(own)]
+            numbers = rough or range(1, len(contacts) + 1)  # where none rubs, the first one says so
             all_changes = {f"contacts.{i}.mu": mu for i in numbers} | all_changes
         return change(read, all_changes)
 
@@ -253,7 +255,10 @@ def _contact(table: Table, parts: list[Any], reading: FileContext) -> Contact:
     if isinstance(table.data.get("mu"), list):
         mu: Any = tuple(table.numbers("mu", 2, "a number, or two: along and across a direction"))
     else:
-        mu = function_of(table, "mu", reading, needed=_rubs(table))
+        mu = function_of(table, "mu", reading, needed=_rubs(table.data))
+    if not (_rubs(table.data) or mu is None or mu == 0):
+        said = "reads no mu; leave it out or give 0, or name a law with friction."
+        raise table.fail(f"the law '{table.data['law']}' {said}", "mu")
     names: dict[str, Any] = {"law": LAWS, "coupling": (), "carrier": SIDES}
     texts = {key: table.take(key, str, among=known) for key, known in names.items()}
     given: dict[str, Any] = {key: value for key, value in texts.items() if value is not None}
@@ -267,10 +272,10 @@ def _contact(table: Table, parts: list[Any], reading: FileContext) -> Contact:
     return made
 
 
-def _rubs(table: Table) -> bool:
-    """Whether the law of a contact needs a coefficient; an unknown law is told later."""
-    law = table.data.get("law")
-    return law not in LAWS or find_law(law).frictional
+def _rubs(contact: object) -> bool:
+    """Whether the law of a contact needs a coefficient; what is no contact or law is told later."""
+    law = contact.get("law") if isinstance(contact, dict) else None
+    return not isinstance(law, str) or law not in LAWS or find_law(law).frictional
 
 
 def _solve(table: Table | None) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from contactopt.cli.completion import NAMES
 from contactopt.coupling.coupling import COUPLINGS
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Place, Table
+from contactopt.problem.laws import LAWS, find_law
 from contactopt.run_options import OPTIONS
 from contactopt.scenes.body_shapes import LENGTHS
 from contactopt.scenes.kinds import KINDS
@@ -154,6 +155,9 @@ def _object(place: tuple[str, ...], found: dict[tuple[str, ...], list[Asked]]) -
         made["properties"] = {key: _entry(place, key, own, found) for key, own in asked.items()}
     given = {key for key, own in asked.items() if all(one.needed for one in own)} - {"mu"}
     needed = sorted(given - {axis for own in KINDS.values() for axis in own.components})
+    if {"law", "mu"} <= set(asked):
+        smooth = {"law": {"enum": [law for law in LAWS if not find_law(law).frictional]}}
+        made["anyOf"] = [{"required": ["mu"]}, {"required": ["law"], "properties": smooth}]
     return made | ({"required": needed} if needed else {})
 
 
