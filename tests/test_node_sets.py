@@ -64,3 +64,15 @@ def test_what_nothing_holds_has_no_reaction():
 def test_an_unknown_name_is_said_before_anything_is_solved(name, words):
     with pytest.raises(InputError, match=words):
         find_quantity(name, two_blocks("plane-strain"))
+
+
+def test_facets_inside_a_body_are_no_place_to_read():
+    """Refined meshes forget them: the reading was not a number, without a word."""
+    scene = two_blocks("plane-strain")
+    upper = scene.upper
+    mesh = upper.build_mesh(scene.elements, scene.zone)
+    inside = np.flatnonzero(mesh.f2t[1] >= 0)[:2]
+    named = mesh.with_boundaries({**mesh.boundaries, "inner": inside})
+    scene = replace(scene, upper=replace(upper, mesh=named))
+    with pytest.raises(InputError, match="boundary 'inner' .* has facets inside the body"):
+        find_quantity(f"displacement:{upper.name}:inner:y", scene)

@@ -147,6 +147,11 @@ def check_there(name: str, part: Part, region: Region, scene: Scene, meeting: bo
                 f"quantity {name!r}: body '{part.name}' has no boundary {face!r}; it has"
                 f" {', '.join(sorted(known)) or 'none'}."
             )
+        if np.any(mesh.f2t[1, np.asarray(known[face])] >= 0):
+            raise InputError(
+                f"quantity {name!r}: boundary {face!r} of body '{part.name}' has facets inside the"
+                " body, which finer meshes do not keep; name one on its surface, or a point."
+            )
     if len(faces) > 1:
         nodes = (mesh.facets[:, np.asarray(known[face])].ravel() for face in faces)
         if not len(reduce(np.intersect1d, nodes)):
