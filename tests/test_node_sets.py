@@ -74,5 +74,5 @@ def test_facets_inside_a_body_are_no_place_to_read():
     inside = np.flatnonzero(mesh.f2t[1] >= 0)[:2]
     named = mesh.with_boundaries({**mesh.boundaries, "inner": inside})
     scene = replace(scene, upper=replace(upper, mesh=named))
-    with pytest.raises(InputError, match="boundary 'inner' .* has facets inside the body"):
+    with pytest.raises(InputError, match=r"boundary 'inner' .* has facets inside the body"):
         find_quantity(f"displacement:{upper.name}:inner:y", scene)
