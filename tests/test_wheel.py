@@ -55,7 +55,8 @@ def environment(folder: Path, *packages: str | Path, beneath: Path | None = None
     if beneath is not None:
         where = "import sysconfig; print(sysconfig.get_path('purelib'))"
         own, lower = (Path(run(one, "-c", where, cwd=folder).strip()) for one in (python, beneath))
-        (own / "beneath.pth").write_text(f"{lower}\n")
+        # with the .pth files there: proxsuite is found by one
+        (own / "beneath.pth").write_text(f"import site; site.addsitedir({str(lower)!r})\n")
     run(python, "-m", "pip", "install", "--quiet", *packages, cwd=folder)
     return python
 
