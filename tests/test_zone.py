@@ -84,9 +84,9 @@ def test_the_coarse_start_keeps_the_form_of_q_and_the_solver(solver, monkeypatch
         pytest.importorskip("pypardiso")
     seen, reduce_bodies = [], module.reduce_bodies
 
-    def spy(scene, elements, zone, Q, solver, once):
+    def spy(scene, elements, zone, Q, solver, **more):
         seen.append((elements, Q, solver))
-        return reduce_bodies(scene, elements, zone, Q, solver, once=once)
+        return reduce_bodies(scene, elements, zone, Q, solver, **more)
 
     monkeypatch.setattr(module, "reduce_bodies", spy)
     solved = solve_zone(
