@@ -73,7 +73,9 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
 
 
 def _meet(problem: InterfaceProblem) -> bool:
-    """Whether contacts of one pair of surfaces are next to those of another one."""
+    """Whether contacts of one pair of surfaces are next to those of another one: no farther than
+    three times the largest way from a contact to the nearest one of its pair.
+    """
     points = [problem.coordinates.T[pair.contacts] for pair in problem.pairs]
     if len(points) < 2 or problem.coordinates.shape[1] != problem.contacts:
         return False

@@ -99,7 +99,7 @@ class Chart:
         return spacing
 
 
-UNNAMED = "contact"
+UNNAMED = "contact"  # the one pair of a problem whose surfaces are not known
 
 
 @dataclass(frozen=True, eq=False)
