@@ -206,9 +206,7 @@ def _said(python: str, program: str) -> str:
 
 
 def _in_space(problem: InterfaceProblem) -> InterfaceProblem:
-    """A problem of the plane with a second tangent along which nothing moves: Q gets there the mean
-    of its diagonal, and q gets 0.
-    """
+    """A problem of the plane with a second tangent along which nothing moves."""
     k = len(problem.q)
     Q, new = problem.Q, float(problem.Q.diagonal().mean()) * sp.eye_array(k)
     order = np.concatenate([np.arange(2 * k).reshape(k, 2), 2 * k + np.arange(k)[:, None]], axis=1)
