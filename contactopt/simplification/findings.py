@@ -13,7 +13,6 @@ from contactopt.simplification.proof import Fold
 from contactopt.solving.solve_scene import Solved
 
 PARTS = {2: "half", 4: "quarter", 8: "eighth"}
-ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,7 @@ class Simplification:
         else:
             error = (
                 f"error about {self.error:.1e}"
-                if self.error > ROUNDING
+                if self.error > 1e-10  # a smaller change between two solutions is rounding
                 else "no error on the coarse mesh"
             )
         (n, k), (m, c) = self.before, self.after
