@@ -1,5 +1,7 @@
 """The default and what it is made of: Newton's method, the proximal loop, warm starts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
@@ -42,12 +44,13 @@ def test_bonded_system_refuses_what_it_cannot_factorise():
             Bonded(Q, np.zeros((2, 0)))
 
 
-@pytest.mark.parametrize("mu", [0, 0.05, 0.2, 0.5, 1, 2, 5, 10])
 @pytest.mark.parametrize("name", SMALL)
-def test_the_scenes_are_certified_at_every_friction_coefficient(name, mu):
-    solution = solve(reduce(make_scene(name, mu=mu, elements=SMALL[name])), tol=1e-10)
-    assert solution.solved and solution.iterations <= 13
-    assert np.all(solution.reactions[:, 0] >= 0)
+def test_the_scenes_are_certified_at_every_friction_coefficient(name):
+    problem = reduce(make_scene(name, elements=SMALL[name]))
+    for mu in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0):
+        solution = solve(replace(problem, law=mu), tol=1e-10)
+        assert solution.solved and solution.iterations <= 13, mu
+        assert np.all(solution.reactions[:, 0] >= 0)
 
 
 def test_small_problems_on_which_fixed_points_fail():
