@@ -94,7 +94,7 @@ class PeerAnswer(Answer):
 
 @dataclass
 class Peer:
-    """A solver in the first of several Pythons that can import it.
+    """An external solver, run by the first of several Python interpreters that can import it.
 
     name     as it is called in messages
     install  the line that installs it

@@ -91,7 +91,7 @@ class Process:
 
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """What a function returns that the process calls; Ended, with `phase`, if it died or took
-        more than `limit` seconds. One that died before the call is started anew, STARTS times.
+        more than `limit` seconds. One that died before the call is started again, STARTS times.
         """
         for _ in range(STARTS):
             self.start()

@@ -180,7 +180,7 @@ def _by_products(problem: InterfaceProblem, linearised: Linearised, accuracy: fl
 
 
 def _with_bodies(problem: InterfaceProblem, linearised: Linearised, accuracy: float) -> Inner:
-    """With the equilibrium of the bodies beside the contacts, without products with Q."""
+    """With the equilibrium of the bodies and that of the contacts, without products with Q."""
     form = problem.Q.coupled
     P = fitted(model_of(problem, deflate=False), form, problem.V)
     coupled, none = Coupled(linearised.equations, form, P), form.pulled(np.zeros(problem.q.size))

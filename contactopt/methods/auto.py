@@ -316,7 +316,7 @@ def _newton(
 ) -> Generator[Iterate | Known, None, Iterate]:
     """Newton's iterates; returns the best. Where the entries of Q, which the next stages need, are
     dear, it goes on until its products have cost as much. After a start that leads nowhere it
-    begins anew at the bonded solution.
+    starts again at the bonded solution.
     """
     Q = problem.Q
     dear = not has_entries(Q) and (Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES)
@@ -334,7 +334,7 @@ def _newton(
         warm = found or start
         note(
             logger,
-            "Newton's method made no progress from the given start and begins anew without it",
+            "Newton's method made no progress from the given start and starts again without it",
         )
     found, residual = yield from _followed(method.with_residuals(problem, None), spent)
     return (found if residual < least else warm) or cold_start(problem)

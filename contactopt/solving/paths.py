@@ -110,7 +110,7 @@ class PathResult:
 
     @property
     def solution(self) -> Solution:
-        """The last state's, with the seconds of the whole path. Where a step failed, it says how:
+        """The solution of the last state, with the seconds of the whole path. If a step failed,
         status, residual, message and iterations are those of that step.
         """
         seconds: Counter[str] = Counter()
