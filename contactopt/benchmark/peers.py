@@ -140,7 +140,7 @@ class Peer:
         if not plain or law.stretch(problem.dim) is not None:
             raise InputError(f"{self.name} takes Coulomb's law only, not {type(law).__name__}.")
         if problem.dim not in dims and 3 not in dims:
-            raise InputError(f"this solver of {self.name} is one of the plane.")
+            raise InputError(f"this solver of {self.name} takes problems in the plane only.")
         if not has_entries(problem.Q):
             problem = problem.explicit()
         p, scales = dimensionless(problem)

@@ -81,7 +81,7 @@ class Tangent:
 
     @cached_property
     def transposed(self) -> Tangent:
-        """The system for z and b of this module's head, for a symmetric Q."""
+        """The system for z and b defined at the top, for a symmetric Q."""
         return replace(self, D=self.D.transpose(0, 2, 1))
 
     @cached_property

@@ -142,7 +142,7 @@ def _turns_one_way(problem: InterfaceProblem) -> bool:
 
 
 def _guaranteed(problem: InterfaceProblem, shape: np.ndarray, energy: bool) -> Thresholds:
-    """Statements 1 and 2 of the module's head; 2 if Q has an `energy`."""
+    """Statements 1 and 2 from the top; 2 if Q has an `energy`."""
     n, t = _parts(problem)
     nn, nt, tn, tt = (problem.Q[np.ix_(i, j)] for i in (n, t) for j in (n, t))
     try:

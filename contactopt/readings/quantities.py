@@ -75,7 +75,7 @@ class Quantity:
 
 
 def find_quantity(name: object, scene: Scene) -> Quantity:
-    """Find a quantity by its name in this module's head, before anything is solved. InputError for
+    """Find a quantity by its name listed at the top, before anything is solved. InputError for
     what the scene does not have.
     """
     if not isinstance(name, str):

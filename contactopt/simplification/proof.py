@@ -47,7 +47,7 @@ def certificate_of_whole(
     whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]
 ) -> float:
     """How far the whole is from solved by what the part's solution says of it: the largest error in
-    this module's head [-]; infinite where something of the whole has no place in the part. `folds`
+    this module's docstring [-]; infinite where something of the whole scene is not in the part. `folds`
     say how the whole lies on it.
     """
     bodies: dict[str, Any] = {}
