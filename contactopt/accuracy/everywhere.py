@@ -87,9 +87,7 @@ def remainder(before: float | None, last: float, best: float) -> tuple[float, fl
 
 
 def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | None]:
-    """Signed error of the last value of nested meshes, infinite for a single one, and the observed
-    order.
-    """
+    """Signed error of the last of nested meshes, infinite for a single one; observed order."""
     steps = np.diff(values[-3:])
     if not len(steps):
         return np.inf, None
@@ -191,9 +189,7 @@ class Everywhere:
     def advance(
         self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
     ) -> float:
-        """Choose the next mesh; returns how many unknowns it will have. Around `contacts` the mesh
-        is too coarse to know, and `rivals` are local maxima that may be the largest.
-        """
+        """Choose the next mesh; returns how many unknowns it will have."""
         if not self.jobs:
             n, s = max(elements for elements, _ in self.values), self.splits + 1
             fine = abs(judged.grading) > max(abs(judged.mesh), reading.uncertainty)
@@ -205,9 +201,7 @@ class Everywhere:
         return self._unknowns(*self.jobs[0])
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
-        """By how much the quantity changes in the other shape of guessed boundaries, of which there
-        are none here, and a sentence on them.
-        """
+        """Nothing changes: there are no guessed boundaries here."""
         return 0.0, ""
 
     def _unknowns(self, elements: int, splits: int) -> float:

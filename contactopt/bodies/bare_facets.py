@@ -53,9 +53,7 @@ class BareSurface(NamedTuple):
 
 
 def ordered(points: np.ndarray, facets: np.ndarray, what: str) -> np.ndarray:
-    """The facets (f, j) with their corners first and cyclic, then the middles of their edges, from
-    (0, 1) on, then their centres. InputError where nodes in the middle are not.
-    """
+    """The facets (f, j): corners cyclic, then middles of edges from (0, 1) on, then centres."""
     (dim, _), count = points.shape, facets.shape[1]
     corners, facets = KINDS[dim, count][1], facets.copy()
     if (dim, count) == (2, 3):  # the middle may be named second

@@ -185,9 +185,7 @@ def _words(mesh: Mesh) -> str:
 
 
 def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:
-    """Raise InputError unless every element can be reached from every other across facets, and
-    every node belongs to one.
-    """
+    """InputError unless facets connect all elements, and every node belongs to one."""
     inner = mesh.f2t[:, mesh.f2t[1] >= 0]
     piece = joined(inner, mesh.nelements)
     pieces = len(np.unique(piece))

@@ -107,9 +107,7 @@ class EquilibriumElements(Simplices):
 
     @cached_property
     def bilinear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Shape functions (e, 4, s) of the quadrilaterals, and their slopes (e, 4, 2, s), at
-        points.
-        """
+        """Shape functions (e, 4, s) and slopes (e, 4, 2, s) of quadrilaterals."""
         places = np.einsum("dve,vs->des", self.mesh.p[:, self.mesh.t], self._points)
         N, slopes = bilinear(self.mesh.p[:, self.corners], places)
         return np.ascontiguousarray(N.swapaxes(0, 1)), np.ascontiguousarray(
@@ -207,9 +205,7 @@ class EquilibriumElements(Simplices):
 
     @cached_property
     def _numbers(self) -> tuple[np.ndarray, np.ndarray]:
-        """(e, 6 (k + 1)) the places of an element's tractions among those of all edges, which are
-        (facets, k + 1, 2); and their signs.
-        """
+        """(e, 6 (k + 1)) the places among all (facets, k + 1, 2) tractions; signs."""
         count = self.degree + 1
         along = np.arange(count)
         backwards = self.slots[:, 0].T[..., None] == 1  # (e, 3, 1)
@@ -225,9 +221,7 @@ class EquilibriumElements(Simplices):
         return out
 
     def _balance(self, force: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray]:
-        """The forces on elements by the tractions, and those of the load: along z, or in plane
-        strain along both axes and about the centroid.
-        """
+        """Forces on elements by tractions, and by the load: also about centroids."""
         number, sign = self._numbers
         count, lever = self.degree + 1, LEVERS[self.degree]
         corners = self.mesh.p[:, self.mesh.t]

@@ -99,9 +99,7 @@ class BalancedMoments:
         return self._slopes.T.tocsr()
 
     def _strains(self, F: np.ndarray) -> np.ndarray:
-        """The mean strains (e, dim, dim) of the body under the forces of stresses, which are F (e,
-        dim, dim) over the volume.
-        """
+        """The mean strains (e, dim, dim) under forces of the stresses F over the volume."""
         d = self.cells.dim
         w = self.answer.moved((self._back @ F.reshape(-1, d)).T)
         return _symmetric((self._slopes @ w.T).reshape(-1, d, d))

@@ -189,9 +189,7 @@ class PressedScene:
         return ForceResponse(body.body.degree, moved)
 
     def balanced(self, t: np.ndarray, resultants: np.ndarray) -> np.ndarray:
-        """Tractions (k, dim) that balance resultants (p,) in the free motions, each scaled by what
-        it does there.
-        """
+        """Tractions (k, dim), scaled to balance the resultants (p,) of free motions."""
         bodies = zip(self.bodies, self.loads)
         work = np.concatenate([load.T @ body.motions.fields for body, load in bodies], axis=1)
         if not work.shape[1]:
@@ -206,9 +204,7 @@ class PressedScene:
         return t * (1 + change)[:, None]
 
     def admissible(self, nodal: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """The displacements with what keeps the gap from being negative, and closes it where there
-        is pressure: hat functions at vertices and bubbles between them.
-        """
+        """The displacements, with hats and bubbles that keep the gap from being negative."""
         d = self.problem.dim
         nodes = facet_nodes(d)
         out = [own.copy() for own in nodal]
@@ -248,9 +244,7 @@ class PressedScene:
         component: int = 0,
         change: bool = False,
     ) -> float:
-        """The work of a component of tractions, (k,), in the gap or the slip, or in what
-        displacements change of them.
-        """
+        """The work of tractions (k,) of a component in the gap or the slip, or in its change."""
         total = 0.0
         for pair in self.pairs:
             jump = pair.jump(nodal, pair.rule, change)[component]

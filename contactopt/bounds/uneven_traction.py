@@ -161,9 +161,7 @@ def _by_fans(scene: PressedScene, pair: FacingFacets) -> np.ndarray:
 
 
 def _fans(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray) -> tuple[Any, np.ndarray]:
-    """A mesh of fans of triangles (e, 3, 2), numbered fan by fan, and the moments (facets, 2, 2) of
-    tractions (e, 2, 2) that are linear between the first two corners of each.
-    """
+    """A mesh of fans of triangles, and moments of tractions, linear on their first edges."""
     count = len(corners)
     follows = np.concatenate([[False], fan[1:] == fan[:-1]])
     number = np.zeros((3, count), dtype=int)

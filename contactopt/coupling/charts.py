@@ -142,9 +142,7 @@ def _mean_normal(contacts: ContactPoints) -> np.ndarray:
 
 
 def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
-    """The first direction of a surface without planes of symmetry, in the sense in which the areas
-    or else the first contact reach further.
-    """
+    """The first direction of a surface without symmetry, where areas or a contact reach further."""
     points, areas = contacts.points, contacts.areas
     centred = points - (points @ areas / areas.sum())[:, None]
     centred = centred - np.outer(n, n @ centred)

@@ -52,9 +52,7 @@ def matrices_of(reduction: Reduction) -> dict[str, Any]:
 
 
 def write_matrices(reduction: Reduction, path: Path, form: str) -> None:
-    """Write them as NumPy's npz, sparse matrices by their data, indices, indptr and shape, or into
-    a folder of Matrix Market files.
-    """
+    """Write them as NumPy's npz, or into a folder of Matrix Market files."""
     from scipy.io import mmwrite
 
     found = matrices_of(reduction)

@@ -121,9 +121,7 @@ def _staging(folder: Path) -> Iterator[Path]:
 
 @contextmanager
 def _ctrl_c_waits() -> Iterator[None]:
-    """An interrupt within this block is heeded when the block ends, so that its steps are made all
-    or none. Only Python's main thread can be interrupted.
-    """
+    """An interrupt within this block is heeded when it ends, in Python's main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

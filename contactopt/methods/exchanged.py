@@ -37,9 +37,7 @@ UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 
 
 def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) -> Solution:
-    """The solution with the least friction at every place where contacts can exchange forces, its
-    certificate at most `tol`, and a note of a place where this leaves some, or several solutions.
-    """
+    """The solution with the least friction where contacts exchange forces, and a note about it."""
     points, places = problem.coordinates.T, problem.shared_places
     if not solution.solved or not (places or _meet(problem)):
         return solution
@@ -73,9 +71,7 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
 
 
 def _meet(problem: InterfaceProblem) -> bool:
-    """Whether contacts of one pair of surfaces are next to those of another one: no farther than
-    three times the largest way from a contact to the nearest one of its pair.
-    """
+    """Whether contacts of two pairs are neighbours: within three times the largest spacing."""
     points = [problem.coordinates.T[pair.contacts] for pair in problem.pairs]
     if len(points) < 2 or problem.coordinates.shape[1] != problem.contacts:
         return False
@@ -97,9 +93,7 @@ def _most_friction(solution: Solution, at: np.ndarray) -> np.ndarray:
 def _exchanged(
     problem: InterfaceProblem, solution: Solution, tol: float, near: np.ndarray, at: np.ndarray
 ) -> tuple[Solution, np.ndarray]:
-    """The solution with the least friction that some contacts can exchange, and where this leaves
-    some, at the contacts `at`, or several solutions.
-    """
+    """The solution with the least friction that contacts exchange; where some or several stay."""
     left = EMPTY
     for contacts in _closed(problem, solution, near):
         own, unfelt = exchanges(problem, contacts)
@@ -115,9 +109,7 @@ def _exchanged(
 
 
 def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The unknowns (m,) of the forces of some contacts, and a basis (m, j) of those changes y of
-    them with Q y = 0 and V' y = 0.
-    """
+    """Unknowns (m,) of some contacts' forces, and the basis (m, j) of y with Q y = 0, V' y = 0."""
     Q, dim = problem.Q, problem.dim
     free = np.zeros((problem.contacts, dim), dtype=bool)
     free[contacts, 0], free[contacts, 1:] = True, problem.law.rough[contacts, None]
@@ -145,9 +137,7 @@ def _unfelt(felt: np.ndarray) -> np.ndarray:
 
 
 def _closed(problem: InterfaceProblem, solution: Solution, at: np.ndarray) -> Iterator[np.ndarray]:
-    """Those of some contacts that have no gap, then the pressed ones among these, then those of
-    them that are within friction.
-    """
+    """Contacts of `at` without a gap, then the pressed ones of these, then the sticking ones."""
     r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
     bound = problem.law.lowest < 0
     normal = np.where(bound, np.inf, r[:, 0])

@@ -27,9 +27,7 @@ class Method(Protocol):
         ...
 
     def backends(self, dim: int) -> tuple[str, str]:
-        """The normal and the tangential backend for dim 2 or 3, NATIVE where the method needs none.
-        InputError if one cannot be used.
-        """
+        """The normal and tangential backend for dim, NATIVE for none; InputError if unusable."""
         return NATIVE, NATIVE
 
 

@@ -53,9 +53,7 @@ INSIDE = 8  # order of the quadrature in a cell, whose points sample the chords 
 
 
 def chord_remarks(reduction: Reduction, solution: Solution) -> list[str]:
-    """One sentence for each pair of surfaces whose largest pressure owes more than SHOWN of itself
-    to the facets of its meshes.
-    """
+    """A sentence on each pair whose largest pressure owes more than SHOWN to straight facets."""
     if not solution.solved:
         return []
     d, angles = _heights_and_angles(reduction)

@@ -23,7 +23,6 @@ from contactopt.scenes.scene import Part, Scene
 SHARE = 0.02
 STIFFEST, SOFTEST = 1.3e12, 1e2  # Young's moduli [Pa]: above that of diamond, below that of gels
 FAINT = 1e-9  # stress of a load over Young's modulus: no load on a solid strains it less
-STIFFER = 3e5  # ratio of Young's moduli: that of steel to soft rubber is 1e5
 LARGER = 300.0  # ratio of sizes: metres beside millimetres, of bodies up to three times as large
 
 UNPUSHED = (
@@ -157,7 +156,7 @@ def _stiffness(scene: Scene) -> list[str]:
     for names in combinations(moduli, 2):
         soft, stiff = sorted(names, key=lambda name: moduli[name][0])
         ratio = moduli[stiff][0] / moduli[soft][0]
-        if ratio > STIFFER:
+        if ratio > 3e5:  # ratio of Young's moduli: that of steel to soft rubber is 1e5
             notes.append(
                 f"body '{stiff}' is {ratio:.1e} times as stiff as '{soft}': are both given in the"
                 " same unit? A body that does not deform can be a rigid one."

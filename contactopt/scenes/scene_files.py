@@ -224,9 +224,7 @@ def _found(top: Table, parts: list[Any], reading: FileContext) -> list[Table]:
 
 
 def _free(part: Part) -> Mesh:
-    """The mesh of a part with those boundaries that share no facet with those of supports and
-    loads, and are not the whole surface where there are others.
-    """
+    """The mesh with those boundaries that share no facet with those of supports and loads."""
     named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
     holders: tuple[Support | Load, ...] = (*part.supports, *part.loads)
     used = [named[own.boundary] for own in holders if own.boundary in named]

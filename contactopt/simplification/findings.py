@@ -13,7 +13,6 @@ from contactopt.simplification.proof import Fold
 from contactopt.solving.solve_scene import Solved
 
 PARTS = {2: "half", 4: "quarter", 8: "eighth"}
-ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +27,8 @@ class Simplification:
     scene     the simplified scene
     folds     how the scene that it is applied to lies on the simplified one, where both have the
               same answer; else empty
-    proof     certificate of the whole scene with the answer of the simplified one; None where it was
-              not computed
+    proof     certificate of the whole scene with the answer of the simplified one; None where it
+              was not computed
     error     relative error of a simplification that is not exact
     check     function of the solved simplified scene that says in a sentence whether what was
               assumed holds; None where nothing was assumed
@@ -48,7 +47,7 @@ class Simplification:
 
     @property
     def exact(self) -> bool:
-        """Whether the certificate of the whole scene proves that both scenes have the same answer."""
+        """Whether the whole scene's certificate proves that both scenes have the same answer."""
         return self.proof is not None and self.proof <= PROVED
 
     @property
@@ -61,7 +60,7 @@ class Simplification:
         else:
             error = (
                 f"error about {self.error:.1e}"
-                if self.error > ROUNDING
+                if self.error > 1e-10  # a smaller change between two solutions is rounding
                 else "no error on the coarse mesh"
             )
         (n, k), (m, c) = self.before, self.after

@@ -89,9 +89,7 @@ def unheld_words(
 
 
 def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
-    """One sentence on a state that slides, after the state `before`; without one the forces are
-    known too badly to say what friction holds.
-    """
+    """One sentence on a state that slides, after the state `before`, unless that is none."""
     force, most = _unit(scene, found.motion), float(f"{found.most:.3g}")
     load = f"the load along {found.motion} is {found.load:.6g} {force}"
     held = "more than friction holds"

@@ -164,9 +164,7 @@ def _dissected(graph: sp.csr_matrix, points: np.ndarray) -> Iterator[np.ndarray]
 
 
 def _cut(graph: sp.csr_matrix, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mask of the nodes left of the separator, and of the separator: nodes left of the median of x
-    that touch its right.
-    """
+    """Masks of the nodes left of a separator, and of it: what touches the right of the median x."""
     below = np.zeros(len(x), dtype=bool)
     below[np.argsort(x, kind="stable")[: len(x) // 2]] = True
     separator = below & (graph @ (~below).astype(np.int8) > 0)

@@ -125,10 +125,7 @@ class Coupled:
         return State(X, r.reshape(self.equations.q.shape), multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
-        """The forces r + error, at the solution equal to r, with what Q makes of them. One V-cycle
-        improves the displacements; the accuracy stated is that before it, the energy (f'Bf)^1/2 of
-        the missing forces f over that of the displacements.
-        """
+        """The forces r + error, equal to r at the solution, what Q makes of them, its accuracy."""
         r = at.r + error
         return r, at.multipliers, improved(self.form, at.X, r)
 

@@ -43,8 +43,6 @@ from contactopt.problem import InterfaceProblem
 
 logger = logging.getLogger(__name__)
 
-FLAT = 1e-8  # eigenvalues of D below this are zero
-
 
 def model_of(
     problem: InterfaceProblem, name: str | None = None, deflate: bool = True
@@ -149,7 +147,7 @@ def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarr
     # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact
     # only.
     values, vectors = np.linalg.eigh(D)
-    contact, which = np.nonzero(values > FLAT)
+    contact, which = np.nonzero(values > 1e-8)  # eigenvalues of D below this are zero
     columns = vectors[contact, :, which]  # (m, d)
     rows = (contact[:, None] * d + np.arange(d)).ravel()
     m = len(contact)
