@@ -254,6 +254,7 @@ def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, fact
     assert found.factor == pytest.approx(factor, rel=1e-4) and said in str(found), found
 
 
+@pytest.mark.slow
 def test_a_wedge_that_locks_itself_rests_only_where_its_forces_arise():
     """Forces in the cones balance any pull on it, but it lifts off where the pull exceeds the push
     on its top: below .15 times the push.
