@@ -217,8 +217,8 @@ def face_of(
     length = float(np.linalg.norm(normal))
     if length < CLOSED * area:
         raise InputError(
-            f"body '{part.name}': the normals of {boundary!r} point around, and have no mean along"
-            " which a bolt could pull; name a face with one side."
+            f"body '{part.name}': the normals of {boundary!r} have no mean along which a bolt could"
+            " pull, because the boundary is closed; name a face with one side."
         )
     held = _constraints(scene, part, basis)
     held.add_supports()
