@@ -284,7 +284,6 @@ def test_operators_that_share_their_work_count_together():
 @pytest.mark.parametrize(
     ("dim", "elements", "count", "options"),
     [
-        (2, 16, 4, {"Q": "implicit", "solver": "superlu"}),
         (2, 16, 8, {"Q": "implicit", "solver": "superlu"}),
         (3, 4, 4, {"Q": "implicit", "solver": "superlu"}),
         (2, 16, 4, {"solver": "multigrid"}),
