@@ -290,7 +290,7 @@ def case(scene: Scene, exact: Callable[..., Any] | None = None) -> dict[str, Any
     row["reference's bound"], row["kappa"] = best.error, ""
     if row["law"] == "coulomb":
         unique = diagnose(solved.reduction.problem.explicit()).guaranteed.unique
-        row["kappa"] = 2 * scene.pairs[0].mu / unique if unique > 0 else "none"
+        row["kappa"] = 2 * scene.pairs[0].mu / unique if unique > 0 else "none"  # type: ignore[operator]
     plate = any(isinstance(load, Plate) for part in scene.meshed.values() for load in part.loads)
     row |= {"quantity": "", "its error": "", "its bound": "", "its ratio": ""}
     quantity = find_quantity("approach" if plate else "normal_force", scene)
@@ -461,14 +461,14 @@ def stopping() -> list[dict[str, Any]]:
         for tol in (1e-8, CERTIFIED, ANY):
             work = partial(solve_scene, scene, n, scene.zone, Options(solver=solver, tol=tol))
             found.append((_seconds(work), work()))
-        saved = _saved(*found[:2], "energy") | {"first step [s]": found[2][0]}
+        saved = _saved(*found[:2], "energy") | {"first step [s]": found[2][0]}  # type: ignore[call-arg]
         rows.append({"work": f"solve {name}, {solver}"} | saved)
     found = []
     for tol in (1.000001e-8, 1e-8):  # one that is asked for, and the usual one
         options, most = Options(solver="multigrid", tol=tol), Limits(unknowns=40_000)
         work = partial(refine, [make_scene("punch-3d")], "energy", 1e-2, options, most)
-        found.append((_seconds(work), work()[0]))
-    saved = _saved(*found, "energy") | {"first step [s]": ""}
+        found.append((_seconds(work), work()[0]))  # type: ignore[index]
+    saved = _saved(*found, "energy") | {"first step [s]": ""}  # type: ignore[call-arg]
     rows.append({"work": "search punch-3d, multigrid"} | saved)
     return rows
 

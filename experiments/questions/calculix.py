@@ -48,7 +48,7 @@ def compared(name: str, settings: dict[str, Any], factor: float) -> dict[str, An
     end = "converged" if len(answer) else "no answer"
     forces, displacements, first = [], [], 0
     for U, body, T in zip(moved, reduction.bodies, reduction.maps) if len(answer) else ():
-        assembly, unknowns = body.body, body.body.unknowns
+        assembly, unknowns = body.body, body.body.unknowns  # type: ignore[attr-defined]
         theirs = np.zeros(len(U))
         theirs[unknowns] = answer[first : first + unknowns.shape[1], : scene.dim].T
         ours = T.T @ solution.reactions.ravel()

@@ -100,7 +100,7 @@ def draw(rows: list[dict]) -> Any:
         mine = [row for row in rows if row["way"] == way and float(row["mu"]) == FRICTION[-1]]
         lines.append((way, *([float(row[key]) for row in mine] for key in ("unknowns", "CPU [s]"))))
     _, n, cpu = lines[0]
-    lines.append(("proportional to $n$", n, [cpu[0] * size / n[0] for size in n]))
+    lines.append(("proportional to $n$", n, [cpu[0] * size / n[0] for size in n]))  # type: ignore[operator]
     draw_lines(ax, lines, ("o-", "s-", ":"))
     ax.set(xlabel="displacement unknowns $n$ [-]", ylabel="CPU time with set-up [s]")
     return figure

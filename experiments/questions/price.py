@@ -29,7 +29,7 @@ from experiments.report import measure, template
 
 REPEATS = 5
 BATCH, SIZE = 256, 8
-GRIDS = (128, 512, 1024)
+GRIDS = (256, 512, 1024)
 IMPORTS = "import numpy, scipy, skfem, matplotlib"
 Rows = list[dict[str, Any]]
 
@@ -119,7 +119,7 @@ def whole(scene: Scene, **options: Any) -> tuple[float, float, float]:
 def runs() -> Rows:
     """Whole runs, beside what they cannot do without."""
     punch, half = scenes.flat_punch(3, elements=32), pressed("wavy", 1024, "frictionless")
-    multigrid, setup, _ = apart(whole, punch, solver="multigrid")
+    multigrid, setup, _ = apart(partial(whole, solver="multigrid"), punch)
     running, _, solving = apart(whole, half)
     return [
         row("run of a punch in space by multigrid", multigrid, 1.6, "set-up, one product", setup),
@@ -129,7 +129,7 @@ def runs() -> Rows:
 
 def searched(name: str, quantity: str) -> tuple[float, float]:
     """CPU seconds of a search for 1 %, and of one solve on its last mesh."""
-    scene = scenes.SCENES[name]()
+    scene = scenes.make_scene(name)
     searching, result = cpu(lambda: contactopt.run(scene, accuracy=1e-2, quantity=quantity))
     last, _ = cpu(lambda: contactopt.run(result.scene))
     return searching, last

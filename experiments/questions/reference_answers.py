@@ -160,7 +160,7 @@ def reference(problem: InterfaceProblem | Sequence, limit: float) -> dict[str, A
         pressed = max(float(np.linalg.norm(r)), 1e-300)  # nothing may touch
         known["distance of forces"] = short(np.linalg.norm(r - other) / pressed)
         moved = np.linalg.norm(problem.Q @ r.ravel())
-        known["distance of displacements"] = short(np.linalg.norm(u - w) / max(moved, 1e-300))
+        known["distance of displacements"] = short(np.linalg.norm(u - w) / max(moved, 1e-300))  # type: ignore[operator]
     return known
 
 

@@ -19,7 +19,7 @@ from contactopt import InterfaceProblem, Solution, scenes, solve
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.derivatives.states import chain_of
 from contactopt.jax import solve as jax_solve
-from contactopt.methods.driver import TOL
+from contactopt.defaults import TOL
 from contactopt.problem.scaling import immovable
 from contactopt.readings.quantities import seeds_of
 from contactopt.scenes.parameters import parameters
@@ -275,7 +275,7 @@ def through_jax() -> list[dict[str, Any]]:
         weight = jnp.asarray(turn)
 
         def value(*data: Any, tol: float = TOL, s: Any = s, weight: Any = weight) -> Any:
-            return (weight * jax_solve(*data, s, tol=tol)[0]).sum()
+            return (weight * jax_solve(*data, s, tol=tol)[0]).sum()  # type: ignore[call-arg]
 
         plain, both = jax.jit(value), jax.jit(jax.value_and_grad(value, argnums=(0, 1, 2, 3)))
         exact = partial(value, tol=1e-13)

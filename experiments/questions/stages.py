@@ -20,6 +20,7 @@ from contactopt.benchmark.families.packings import packing
 from contactopt.benchmark.testset.problem_set import problems
 from contactopt.methods import auto, constants
 from contactopt.methods.kernels.alart_curnier import cold_start
+from contactopt.methods.nested import Nested
 from experiments.report import template, write
 
 # packings: dimension, bodies, contacts of a pair of bodies
@@ -100,7 +101,7 @@ INTERIOR = (auto, "interior_iterates", nothing)
 # stage -> object and attribute, what stands for it where it is left out, which calls are its own
 STAGES: dict[str, tuple[Any, str, Callable[..., Any], Callable[..., bool]]] = {
     "first sweeps": (SWEPT, "points", nothing, sweeps(constants.FIRST_SWEEPS)),
-    "nested grids": (auto.Nested, "with_residuals", nothing, every),
+    "nested grids": (Nested, "with_residuals", nothing, every),
     "Newton's method": (auto, "_newton", bonded, every),
     "proximal steps near Newton's best": (
         ROBUST,

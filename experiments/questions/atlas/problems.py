@@ -238,4 +238,4 @@ def run(name: str, case: Case, seconds: float = LONG, **settings: Any) -> End:
         return End(np.inf, "refused", 0, np.zeros((0, 1)), np.zeros(0))
     history = np.array([row["residual"] for row in answer.history])
     path = np.array(watch.path) if watch.path else np.zeros((0, 1))
-    return End(answer.residual, answer.status.label, answer.iterations, path, history)
+    return End(answer.residual, answer.status.label, answer.iterations, path, history)  # type: ignore[attr-defined]

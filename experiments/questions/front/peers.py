@@ -77,7 +77,7 @@ class Model:
                       for name in ("contact", "axis", "bottom")}  # fmt: skip
         self.nodes["contact"] = self.nodes["contact"][np.argsort(mesh.p[0, self.nodes["contact"]])]
         self.x = mesh.p[0, self.nodes["contact"]]
-        self.radius = FLATTER / 2 / float(self.scene.upper.gap(np.array([[1.0], [0.0]]))[0])
+        self.radius = FLATTER / 2 / float(self.scene.upper.gap(np.array([[1.0], [0.0]]))[0])  # type: ignore[operator]
 
     @property
     def indenter(self) -> skfem.MeshQuad:
