@@ -24,7 +24,7 @@ from contactopt.meshes.cells import straight
 from contactopt.meshes.curves import CORNER
 from contactopt.meshes.structured import simplices
 from contactopt.problem import Solution
-from contactopt.readings.peaks import Peak, Reading, at_rim, neighbours, nodal_pressure
+from contactopt.readings.peaks import Peak, Reading, around, at_rim, nodal_pressure
 from contactopt.readings.resultants import views
 from contactopt.scenes.scene import Part, Scene
 
@@ -75,7 +75,7 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     scene, (view, own) = reduction.scene, views(reduction, solution)[number]
     pressure, places = nodal_pressure(view.problem, own), view.problem.coordinates
     top = int(np.argmax(pressure))
-    near = neighbours(view.problem)[top]
+    near = around(view.problem, top)
     near = near[near != top]
     rises = len(near) > 0 and pressure[top] > max(RISE * np.max(pressure[near]), 0.0)
     if not rises or not at_rim(view, own):

@@ -108,6 +108,13 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
     return np.asarray(node[near.reshape(problem.contacts, count)])
 
 
+def around(problem: InterfaceProblem, contact: int) -> np.ndarray:
+    """Numbers of the contacts nearest to one, itself among them."""
+    places, node = _surroundings(problem)
+    far = np.linalg.norm(places - problem.chart.places[:, [contact]], axis=0)
+    return np.asarray(node[least(far, min(NEIGHBOURS[problem.dim], len(node)))])
+
+
 def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:
     """Numbers of places whose size is the largest around, the largest first, not by rounding."""
     chosen = np.flatnonzero(sizes >= (1 - EQUAL) * largest)
@@ -208,7 +215,10 @@ def _fit_to(
     at_top = abs(float(fit[0]) - nodal**2) if usable[top] else 0.0
     # rings at an axis bear little
     at_top *= min(1.0, float(np.sqrt(problem.areas[top] / areas.mean())))
-    beside = _beside_open(places, pressure[node], usable[node], near) if dim > 1 else 0.0
+    beside = 0.0
+    if dim > 1:  # no contact of these has its neighbours farther from the top than three times
+        some = usable[node] & ((distance <= 3.01 * reach) | (len(near) < NEIGHBOURS[3]))
+        beside = _beside_open(places, pressure[node], some, near)
     doubt = max(scatter / 2, at_top / 2, BESIDE * beside * nodal**2)
     if _outermost(offset[:, near]):
         return replace(alone, uncertainty=doubt / (nodal or 1.0))
