@@ -231,7 +231,9 @@ def _motion(state: State, component: int) -> Seeds:
         found = motion(reduction, state.displaced, component)
     plates = len(state.solution.multipliers)
     if found is None or not plates:
-        why = "its surfaces go around a body and have no mean normal" if plates else "it has no plate"
+        why = (
+            "its surfaces go around a body and have no mean normal" if plates else "it has no plate"
+        )
         raise InputError(
             f"scene '{reduction.scene.name}' has no {'shift' if component else 'approach'}, since"
             f" {why}; ask for another quantity."
