@@ -12,8 +12,6 @@ from contactopt.problem.contact_status import contact_status
 from contactopt.problem.unbalanced_loads import escape
 from contactopt.scenes.scene import Scene
 
-NEAR = 0.9  # share of what friction bears from which on a state without a sticking contact slides
-
 
 class Sliding(NamedTuple):
     """A free motion along which friction gives way: its name, the load along it, and the largest
@@ -48,7 +46,7 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
         load = np.abs(problem.s + r_n @ V[:, 0])
         slips = not contact_status(problem, ended.reactions).stick.any()
         worst = int(np.argmax(load - most))
-        if load[worst] > (NEAR if slips else 1.0) * most[worst] > 0:
+        if load[worst] > (0.9 if slips else 1.0) * most[worst] > 0:  # of what friction bears
             name = problem.motions[worst] if problem.motions else f"motion {worst + 1}"
             held = float(most[worst]) if own is before else np.nan
             found = found or Sliding(name, float(load[worst]), held)
