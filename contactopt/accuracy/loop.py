@@ -1,7 +1,5 @@
 """Solve, estimate, refine: the one loop that bounds the error of a quantity."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Sequence

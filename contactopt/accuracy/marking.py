@@ -1,7 +1,5 @@
 """Which elements are divided, and the meshes that come of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -5,8 +5,6 @@ about CONSTANTS / n^2 at most. The constants are those of eight scenes with know
 rule was judged by twenty others: `python -m experiments.questions.front` measures both.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, sqrt
 

@@ -7,8 +7,6 @@ polynomials, on panels that shrink towards the stick limit v = b where the tract
 singular integrals of the polynomials are exact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -9,8 +9,6 @@ Q in rows of blocks (dim, dim), namely `indptr`, `indices` and `data`, `q` (k, d
 `solve` is timed.
 """
 
-from __future__ import annotations
-
 import inspect
 import json
 import pickle

@@ -6,8 +6,6 @@ to nobody and have no weight. Facets of three nodes in the plane are those of qu
 the stiffness says so, else of triangles.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -24,8 +24,6 @@ faces around the contact boundary: a node that slides over an edge is lost.
 Source: G. Dhondt, CalculiX CrunchiX USER'S MANUAL.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -16,8 +16,6 @@ of two facets at their common node decides, those of curved elements being exact
 * Where the curve of the boundary is given, its own turn must exceed `KINK`.
 """
 
-from __future__ import annotations
-
 from itertools import permutations
 from typing import NamedTuple
 

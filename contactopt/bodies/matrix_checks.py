@@ -2,8 +2,6 @@
 found by its rigid motions, which need no force, and by its extreme eigenvalues.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Elastic stiffness of a mesh of displacement elements."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -10,8 +10,6 @@ Source: Boffi, Brezzi, Fortin (2013), Mixed Finite Element Methods and Applicati
 section 5.1.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import skfem
 from scipy.spatial import KDTree

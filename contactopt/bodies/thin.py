@@ -16,8 +16,6 @@ Source: Rockafellar (1976), Monotone operators and the proximal point algorithm,
 Optim. 14, 877-898.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

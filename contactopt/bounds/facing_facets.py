@@ -4,8 +4,6 @@ intervals in the plane. In space they are triangles, of which polygons are made 
 contactopt.coupling.segments cuts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import combinations

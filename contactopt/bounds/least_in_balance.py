@@ -1,7 +1,5 @@
 """A quadratic form made least under linear equations, by an augmented Lagrangian."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu

@@ -13,8 +13,6 @@ The same factors are those of an LU factorisation of K', K' = P L U, which `Whol
 array. Then K x = b is solved by two triangular systems wherever the array is taken.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol

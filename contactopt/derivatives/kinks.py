@@ -16,8 +16,6 @@ Sources: Robinson (1980), Strongly regular generalized equations; Luo, Pang, Ral
 4.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass

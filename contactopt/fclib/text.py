@@ -4,8 +4,6 @@ All numbers are separated by white space: dim, contacts, storage, rows, columns,
 (dim numbers per contact) and mu (one per contact). What follows is ignored.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -2,8 +2,6 @@
 path, for the program in pages/view.js.
 """
 
-from __future__ import annotations
-
 import csv
 from contextlib import suppress
 from pathlib import Path

@@ -2,8 +2,6 @@
 what is known exactly.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from inspect import Parameter, getdoc, signature
 from typing import Any

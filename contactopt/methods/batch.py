@@ -5,8 +5,6 @@ Each step solves (I - D + D rho Q) dr = P(r - rho u) - r for every problem that 
 the default method solves. Every answer has the certificate of contactopt.problem.certificate.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -6,8 +6,6 @@ that hold there, those with the least friction are given: a corner under constan
 pressure, and no friction.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from dataclasses import replace

@@ -13,8 +13,6 @@ Source: Jourdan, Alart, Jean (1998), A Gauss-Seidel like algorithm to solve fric
 problems.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot, inf

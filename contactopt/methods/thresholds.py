@@ -47,8 +47,6 @@ convergence near this solution, exact unless a contact is between two states; gl
 other solutions and the solution's change of state with mu are not covered: a heuristic there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -49,8 +49,6 @@ differ much have displacements that differ little (`amplification` says how much
 all units, and costs one product with Q.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -14,8 +14,6 @@ own.
 Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

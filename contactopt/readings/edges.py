@@ -21,8 +21,6 @@ zone nearer to a rectangle than to an ellipse, half of the side of the square wi
 Where an end cannot be read, the nodal areas are counted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

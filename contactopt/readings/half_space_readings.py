@@ -1,7 +1,5 @@
 """What is asked of solved half-spaces: real contact area, pressures, stiffness, slip, maps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ curvatures. The force of each pair is the one that balances the loads, where one
 each of these places can do that. Source: Johnson (1985), Contact Mechanics, sections 4.1 and 4.2.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

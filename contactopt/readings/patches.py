@@ -6,8 +6,6 @@ disc about its centre, seen as one end, or an ellipse: lengths along its axes ar
 becomes the disc of the same area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -2,8 +2,6 @@
 bodies that are misplaced, loads on a surface that may touch. `check` and `run` say the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import combinations

@@ -2,8 +2,6 @@
 says nothing of the mesh.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.checks import place_words

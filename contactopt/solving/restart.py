@@ -6,8 +6,6 @@ above the tolerance the state is solved. Therefore a scene may be changed in bet
 some pair of surfaces has kept its name.
 """
 
-from __future__ import annotations
-
 import time
 import zipfile
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Whether a state that was not solved slides: friction cannot bear its load, whatever sticks."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -18,8 +18,6 @@ npz, as qpsolvers.Problem.save and qpbenchmark write it; CBF, the Conic Benchmar
 (https://cblib.zib.de), in which t >= x' P x / 2 is the rotated cone (t, 1, F x) with F' F = P.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the map of the law (conta
                                       `project`)
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 

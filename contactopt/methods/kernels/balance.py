@@ -7,8 +7,6 @@ from contact to contact, as at a weighted median, and only the exact search find
 sticks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -6,8 +6,6 @@ is the square root of its accuracy off wherever force and gap vanish together. W
 map it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

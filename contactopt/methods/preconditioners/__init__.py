@@ -26,8 +26,6 @@ holds on every subspace with the same constants, so that (G_AA)^-1, by an inner 
 body, has the condition number of P on any active set (`restricted`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import import_module
 
