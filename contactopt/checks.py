@@ -170,8 +170,8 @@ def place_words(x: Iterable[float]) -> str:
 
 
 def short(value: object, most: int = 60) -> str:
-    """Write a value as Python does. Of a text of more than `most` characters, three quarters of
-    these stay, with three dots in the middle.
+    """Write a value as Python does. A text of more than `most` characters is cut to three
+    quarters of them, with three dots in the middle.
     """
     text = repr(value)
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"

@@ -1,4 +1,4 @@
-"""Meshes refined everywhere, made anew for more elements: the error is read from differences of
+"""Meshes refined everywhere, made again with more elements: the error is read from differences of
 nested solutions.
 
 Two numbers describe a mesh: `elements` across the contact half-width, which the scene's mesh
@@ -10,7 +10,7 @@ holds fixed. The error is taken as one part that falls with each,
     J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
 
 both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n
-elements, the second of the last of them and its split, measured anew on the mesh that it asks to
+elements, the second of the last of them and its split, measured again on the mesh that it asks to
 split. Their sizes are added, and the larger part is refined next. The claim is their sum times a
 factor of safety, 1.25 from three meshes on and 3 of two. Orders are observed where there are three
 solutions, and held between 3/4 and the order of functionals of smooth solutions, 2 per degree of

@@ -1,5 +1,5 @@
 """Rows of several campaigns in one table. What others say of an answer is not believed: problems
-are built here anew, in a process of their own, and certificates computed from them.
+are built again here, in a process of their own, and certificates computed from them.
 """
 
 from __future__ import annotations

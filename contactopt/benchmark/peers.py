@@ -104,7 +104,7 @@ class PeerAnswer(Answer):
 
 @dataclass
 class Peer:
-    """A solver in the first of several Pythons that can import it.
+    """An external solver, run by the first of several Python interpreters that can import it.
 
     name     as it is called in messages
     install  the line that installs it
@@ -154,7 +154,7 @@ class Peer:
         if not plain or law.stretch(problem.dim) is not None:
             raise InputError(f"{self.name} takes Coulomb's law only, not {type(law).__name__}.")
         if problem.dim not in dims and 3 not in dims:
-            raise InputError(f"this solver of {self.name} is one of the plane.")
+            raise InputError(f"this solver of {self.name} takes problems in the plane only.")
         key = problem.fingerprint, problem.dim if problem.dim in dims else 3
         parts = None
         if self.process is None or key not in self.held:

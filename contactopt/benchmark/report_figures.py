@@ -61,7 +61,7 @@ NAMES = {
 
 
 def _look(rank: int) -> dict[str, Any]:
-    """Of a line by its rank: the eight first have colours."""
+    """The look of a line by its rank: the first eight have colours."""
     return {"color": COLOURS[rank], "lw": LINE} if rank < len(COLOURS) else dict(FAINT)
 
 

@@ -139,8 +139,8 @@ def bare_surface(
     every: bool,
     coupled: sp.csr_matrix | None,
 ) -> BareSurface:
-    """The trace of the displacement on facets (f, j) with outward normals (dim, f); `coupled` as of
-    turned_outwards, other arguments as of contactopt.bodies.elements.contact_trace.
+    """The trace of the displacement on facets (f, j) with outward normals (dim, f); `coupled` as in
+    turned_outwards, other arguments as in contactopt.bodies.elements.contact_trace.
     """
     dim, (kind, corners) = len(points), KINDS[len(points), facets.shape[1]]
     if (dim, facets.shape[1]) == (2, 3) and coupled is not None:

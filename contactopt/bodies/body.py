@@ -215,8 +215,8 @@ def face_of(
     length = float(np.linalg.norm(normal))
     if length < 1e-3 * area:  # a closed surface has no mean normal
         raise InputError(
-            f"body '{part.name}': the normals of {boundary!r} point around, and have no mean along"
-            " which a bolt could pull; name a face with one side."
+            f"body '{part.name}': the normals of {boundary!r} have no mean along which a bolt could"
+            " pull, because the boundary is closed; name a face with one side."
         )
     held = _constraints(scene, part, basis)
     held.add_supports()

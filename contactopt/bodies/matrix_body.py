@@ -50,7 +50,7 @@ class _SolvedBody(ElasticBody):
 
 @dataclass(frozen=True, eq=False)
 class MatrixBody(AssembledMatrices):
-    """The matrices of a MatrixPart with their part of the scene."""
+    """The assembled matrices of a body that a MatrixPart gives."""
 
     body: GivenMatrices
     part: MatrixPart

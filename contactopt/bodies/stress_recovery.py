@@ -300,7 +300,7 @@ class PatchFit:
     def deviation(self, values: np.ndarray) -> np.ndarray:
         """Standard error (m,) of the fit of values (points,), from what the fit leaves.
 
-        Of noise of variance v, sum_q w_q (what the fit leaves)^2 has the mean
+        If the values are noise of variance v, sum_q w_q (what the fit leaves)^2 has the mean
         v (sum_q w_q - tr(M1^-1 M2)), where M1 and M2 are the moments with the weights w and w^2.
         """
         count, own, w = len(self.inverse), values[self.column], self.weight

@@ -12,9 +12,9 @@ revolution, are polynomials of this degree on each edge. On the axis S is zero, 
 stress finite.
 
 Unknown are the tractions S n at points of the edges, so many that they determine the polynomials.
-They hold every element in balance. Of all stresses in an element that have these tractions that one
-is taken which makes the energy of s - s(u) least, and then the tractions that make it least in the
-whole body: a sparse linear system. The displacement u may be any one.
+They hold every element in balance. Among all stresses in an element with these tractions, the one
+with the smallest energy of s - s(u) is taken, and then the tractions for which this energy is
+smallest in the whole body: a sparse linear system. Any displacement u is allowed.
 
 Integrals with 1 / r are taken by a rule on each part of a triangle.
 
@@ -130,8 +130,8 @@ class EquilibriumElements(Simplices):
         moments: np.ndarray,
         answer: object = None,
     ) -> tuple[np.ndarray, float]:
-        """The stress (e, s, 4) of this module's head that is nearest to `stress`, and the largest
-        force out of balance over the largest one. Arguments as of Tetrahedra.equilibrated(), but
+        """The stress (e, s, 4) defined at the top that is nearest to `stress`, and the largest
+        force out of balance over the largest one. Arguments as in Tetrahedra.equilibrated(), but
         `moments` (facets, 2, 2) take hat functions, if revolved times r.
         """
         g, number = self._given(held, moments).ravel(), self._numbers[0]

@@ -108,14 +108,17 @@ class PressedScene:
         longest = np.sum(edges**2, axis=0)[made.opposite].max(axis=0)
         if np.any(longest > THIN * 2 * made.volume):
             raise InputError(
-                f"{name}: of elements {THIN:g} times as long as high rounding leaves no bound; make"
-                " the mesh less steeply graded."
+                f"{name}: where elements are {THIN:g} times as long as high, rounding leaves no"
+                " bound; make the mesh less steeply graded."
             )
         part: Any = self.reduction.scene.parts[number]
         holding = [own for own in part.supports if "z" in (own.displacement or ("z",))]
         plates = [own for own in part.loads if own.level]
         if self.revolved and plates and len(holding) + len(plates) > 1:
-            raise InputError(f"{name}: a bound needs nothing else that holds it beside the plate.")
+            raise InputError(
+                f"{name}: no bound is known if a plate and a second plate or support hold it along"
+                " the axis; let the plate alone hold it."
+            )
         heavy = any(not own.boundary and own.value[1] for own in part.loads)
         order = 2 if self.revolved and heavy else degree
         return EquilibriumElements(mesh, order, self.revolved, halves.corners)

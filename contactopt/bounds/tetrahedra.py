@@ -189,8 +189,8 @@ class Tetrahedra(Simplices):
         return np.asarray(m[self.opposite[:, None], self.slots] * self.sign[:, None, :, None])
 
     def _energy(self, material: Material, missing: np.ndarray) -> Energy:
-        """Of the stress with the data `missing` by the moments of facets. Single precision does for
-        it, since it says how far the energy can fall but not whether the stress is in balance.
+        """The energy of the stress with the data `missing`, by the moments of facets. Single
+        precision is enough: it says how far the energy can fall, and nothing about balance.
         """
         d, count, stress = self.dim, self.mesh.facets.shape[1], reference_stress()
         inputs, back = (d + 1) * d * d, self.by_moments.T.tobsr((d, d))  # without the body force

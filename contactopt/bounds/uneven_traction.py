@@ -31,8 +31,8 @@ It is finite, by the inequalities of Korn and of traces. The bound is close wher
 nearly regular and larger for others.
 
 In a plane section nothing needs to be estimated: the element is
-cut into a fan of triangles whose outer edges lie between the bends. Of all stresses of composite
-elements on the fan, with d on these edges and none on the others, that of least energy is taken.
+cut into a fan of triangles whose outer edges lie between the bends. The stress is the one of least
+energy among those of composite elements on the fan, with d on these edges and none on the others.
 In bodies of revolution r s takes the place of s.
 """
 

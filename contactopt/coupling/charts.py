@@ -131,7 +131,7 @@ def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndar
 
 
 def _mean_normal(contacts: ContactPoints) -> np.ndarray:
-    """Of the surface, or, where it closes on itself, that of the plane that fits it best."""
+    """The mean normal of a surface; that of the plane that fits best, if it closes on itself."""
     mean = contacts.normals @ contacts.areas / contacts.areas.sum()
     size = float(np.linalg.norm(mean))
     if size > FLAT:

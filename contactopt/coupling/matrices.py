@@ -1,6 +1,6 @@
 """The matrices of a reduced scene for other codes, as arrays in one file or as Matrix Market files.
 
-Of every body with a stiffness, under its name:
+Every body with a stiffness has, under its name:
 
     K, f        stiffness (n, n) and loads (n,), before supports and plates
     N, g, p     the displacements that supports and plates leave: U = g + N v with the unknowns v
@@ -27,7 +27,7 @@ from contactopt.files.writing import whole_file, whole_folder
 
 
 def matrices_of(reduction: Reduction) -> dict[str, Any]:
-    """The arrays and sparse matrices of the head of this module, by names such as 'upper.K'."""
+    """The arrays and sparse matrices listed at the top, by names such as 'upper.K'."""
     problem = reduction.problem.explicit()
     found: dict[str, Any] = {name: getattr(problem, name) for name in ("Q", "q", "V", "s", "mu")}
     for body, B in zip(reduction.bodies, reduction.maps):

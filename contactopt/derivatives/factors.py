@@ -118,7 +118,7 @@ class Square:
 
 @dataclass(frozen=True, eq=False)
 class DenseFactors:
-    """The factors of this module's head, for an array Q.
+    """The factors defined at the top, for an array Q.
 
     order    (m,) equations and unknowns of M in the order of K;  known  how many are known
     scales   (2, m) diagonals of R and C in the order of M

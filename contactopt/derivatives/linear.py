@@ -79,7 +79,7 @@ class Tangent:
 
     @cached_property
     def transposed(self) -> Tangent:
-        """The system for z and b of this module's head, for a symmetric Q."""
+        """The system for z and b defined at the top, for a symmetric Q."""
         return replace(self, D=self.D.transpose(0, 2, 1))
 
     @cached_property
@@ -178,7 +178,7 @@ def _by_products(problem: InterfaceProblem, linearised: Linearised, accuracy: fl
 
 
 def _with_bodies(problem: InterfaceProblem, linearised: Linearised, accuracy: float) -> Inner:
-    """With the equilibrium of the bodies beside the contacts, without products with Q."""
+    """With the equilibrium of the bodies and that of the contacts, without products with Q."""
     form = problem.Q.coupled
     P = fitted(model_of(problem, deflate=False), form, problem.V)
     coupled, none = Coupled(linearised.equations, form, P), form.pulled(np.zeros(problem.q.size))

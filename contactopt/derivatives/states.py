@@ -144,7 +144,7 @@ class Step(State):
 
 @dataclass(frozen=True, eq=False)
 class Duals:
-    """The gradient with respect to a state's data taken to the bodies: G, s* and W of the head."""
+    """The gradient with respect to a state's data on the bodies: G, s* and W as defined above."""
 
     state: State
     dual: Dual

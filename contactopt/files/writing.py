@@ -52,7 +52,7 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     block ends without an error.
 
     After an error `out` holds what it held before, and a folder that was made for it is gone. Files
-    named in `stale` are removed from `out` unless the block wrote them anew. InputError where the
+    named in `stale` are removed from `out` unless the block wrote them again. InputError where the
     operating system refuses to write.
     """
     out = Path(out)

@@ -27,7 +27,7 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """The problem at f = 0, and g (k dim,), l (p,) and c of the head of contactopt.holding."""
+    """The problem at f = 0, and g (k dim,), l (p,) and c as in contactopt.holding."""
 
     problem: InterfaceProblem
     g: np.ndarray

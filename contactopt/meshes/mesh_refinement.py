@@ -107,7 +107,7 @@ def split(mesh: Mesh, curves: Curves) -> Any:
     """Halve all elements of a mesh, with new nodes of curved boundaries on their curves, as for
     `divide`.
 
-    Order and named boundaries stay. Of second order, its nodes on edges and faces have become
+    Order and named boundaries stay. In a mesh of second order the nodes on edges and faces become
     corners.
     """
     fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)

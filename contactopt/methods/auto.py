@@ -306,7 +306,7 @@ class _Robust:
 def _newton(
     problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
 ) -> Generator[Iterate | Known, None, Iterate]:
-    """The best of Newton's iterates; after a start that leads nowhere from the bonded solution."""
+    """The best of Newton's iterates; a start that fails is replaced by the bonded solution."""
     Q = problem.Q
     dear = not has_entries(Q) and (Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES)
 
@@ -323,7 +323,7 @@ def _newton(
         warm = found or start
         note(
             logger,
-            "Newton's method made no progress from the given start and begins anew without it",
+            "Newton's method made no progress from the given start and starts again without it",
         )
     found, residual = yield from _followed(method.with_residuals(problem, None), spent)
     return (found if residual < least else warm) or cold_start(problem)

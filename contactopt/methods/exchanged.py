@@ -1,9 +1,9 @@
 """Forces that contacts around one place can exchange: at a corner of 90 degrees four components of
 two forces move one node in two directions.
 
-Such forces y, with Q y = 0 and V' y = 0, change neither displacements nor balance. Of all forces
-that hold there, those with the least friction are given: a corner under constant pressure has this
-pressure, and no friction.
+Such forces y, with Q y = 0 and V' y = 0, change neither displacements nor balance. Among all
+forces that solve the problem, those with the least friction are given: a corner under constant
+pressure has this pressure, and no friction.
 """
 
 import logging
@@ -83,7 +83,7 @@ def _meet(problem: InterfaceProblem) -> bool:
 
 
 def _most_friction(solution: Solution, at: np.ndarray) -> np.ndarray:
-    """Of some contacts the one with the largest friction."""
+    """The one with the largest friction among some contacts."""
     return at[[np.argmax(np.linalg.norm(solution.reactions[at, 1:], axis=1))]]
 
 
@@ -134,7 +134,7 @@ def _unfelt(felt: np.ndarray) -> np.ndarray:
 
 
 def _closed(problem: InterfaceProblem, solution: Solution, at: np.ndarray) -> Iterator[np.ndarray]:
-    """Of some contacts those without a gap, of these the pressed, of these the sticking ones."""
+    """Contacts of `at` without a gap, then the pressed ones of these, then the sticking ones."""
     r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
     bound = problem.law.lowest < 0
     normal = np.where(bound, np.inf, r[:, 0])

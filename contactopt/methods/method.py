@@ -16,7 +16,7 @@ NATIVE = "native"  # in place of a backend's name: our own linear algebra
 
 
 class Method(Protocol):
-    """What every method offers, as the head of contactopt.methods says."""
+    """What every method offers, as contactopt.methods describes it."""
 
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None

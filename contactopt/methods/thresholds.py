@@ -110,8 +110,8 @@ def _parts(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 def thresholds(
     problem: InterfaceProblem, shape: np.ndarray, energy: bool
 ) -> tuple[Thresholds, Thresholds, bool]:
-    """Of a dimensionless problem with coefficients mu * `shape`: what is guaranteed, what uniform
-    slip loses, and whether both are the same. `energy`: Q is symmetric.
+    """The guaranteed thresholds of a dimensionless problem with coefficients mu * `shape`, those
+    at which uniform slip fails, and whether both are the same. `energy`: Q is symmetric.
     """
     low, high = Thresholds(0.0, 0.0, 0.0), _uniform_slip(problem, shape)
     if not energy:
@@ -137,7 +137,7 @@ def _turns_one_way(problem: InterfaceProblem) -> bool:
 
 
 def _guaranteed(problem: InterfaceProblem, shape: np.ndarray, energy: bool) -> Thresholds:
-    """Statements 1 and 2 of the module's head; 2 if Q has an `energy`."""
+    """Statements 1 and 2 from the top; 2 if Q has an `energy`."""
     n, t = _parts(problem)
     nn, nt, tn, tt = (problem.Q[np.ix_(i, j)] for i in (n, t) for j in (n, t))
     try:

@@ -95,7 +95,7 @@ class Yardsticks:
     rho: np.ndarray
 
     def errors(self, law: Law, r: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """e_i (k,) of the head of this module, for forces r and displacements u, both (k, dim)."""
+        """e_i (k,) as defined at the top, for forces r and displacements u, both (k, dim)."""
         return lengths(r - law.mapped(r - self.rho[:, None] * u)) / self.force
 
 

@@ -112,7 +112,7 @@ class Pair:
 
     @property
     def contacts(self) -> slice:
-        """Of arrays with one row per contact."""
+        """Its rows in arrays with one row per contact."""
         return slice(self.start, self.stop)
 
 

@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True)
 class Infeasible:
     """A proof that a problem has no solution: the ray (weights y (k,), motions z (p,)) of this
-    module's head, or the contradictions of all states of the contacts
+    module's docstring, or the contradictions of all states of the contacts
     (contactopt.methods.kernels.states), for which y and z are zero.
 
     sentence  what it means, for people

@@ -140,10 +140,11 @@ def stick_edge(
     """Read the half-width of the stick zone of one pair, and its uncertainty [length]; `zone` is
     that of contact, where known.
 
-    The slack of the friction bound counts towards the direction in which the nearest slipping node
-    slips. Where contact ends at a corner, the slack over its bound is smooth but not straight: the
-    edge is the mean of what the slack inside and the `slip` (k, dim - 1) of the last step outside
-    read, as uncertain as they differ. A reading off by more than an element is left out.
+    The edge is where the slack of the friction bound is zero, measured in the direction in which
+    the nearest node slips. Where contact ends at a corner there are two readings: one extrapolates
+    the slack over its bound from inside, the other the `slip` (k, dim - 1) of the last step from
+    outside. The edge is their mean, and half their distance is its uncertainty. A reading that is
+    off by more than an element is left out.
     """
     status = contact_status(problem, reactions)
     if not status.stick.any():  # or on less than what belongs to one contact

@@ -76,7 +76,7 @@ def ellipse(force: float, modulus: float, small: float, large: float) -> tuple[f
 
 
 def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz]:
-    """The prediction by name for each curved pair whose force statics give; `free` motions."""
+    """The prediction, by name, for each curved pair whose force follows from statics."""
     from scipy.optimize import nnls  # late, since it takes long to import
 
     pairs = zip(free.pairs, posed.couplings)

@@ -59,8 +59,9 @@ def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Mo
 
 
 def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
-    """Of each side the bodies count that plates or supports hold or move, component by component,
-    else all. Both sides have one direction, so that no translation of the whole scene counts.
+    """On each side only the bodies count that plates or supports hold or move, component by
+    component; without any, all count. Both sides have one direction, so that no translation of
+    the whole scene counts.
     """
     scene, problem = reduction.scene, reduction.problem
     names = [part.name for part in scene.parts]

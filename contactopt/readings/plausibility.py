@@ -34,9 +34,9 @@ def doubts(
     states: Sequence[Scene] = (),
     bears: Callable[[int, str], bool] = lambda number, boundary: True,
 ) -> list[str]:
-    """One sentence for everything about a scene that is probably not as it is meant; `planes` are
-    those of symmetry, `states` the scenes of its load path, if it has one, and `bears` says whether
-    a force acts on a supported boundary of the body with a number, where that is known.
+    """One sentence for each thing in a scene that is probably a mistake. `planes` are the planes of
+    symmetry, `states` the scenes of its load path, if it has one. bears(body, boundary) says
+    whether a force acts on this supported boundary of the body of this number.
     """
     meshed = [part for part in scene.meshed.values() if part.given]
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]

@@ -73,7 +73,7 @@ class Quantity:
 
 
 def find_quantity(name: object, scene: Scene) -> Quantity:
-    """Find a quantity by its name in this module's head; InputError for what the scene lacks."""
+    """Find a quantity by a name listed at the top; InputError for what the scene lacks."""
     if not isinstance(name, str):
         raise InputError(f"a quantity is given by its name; got {name!r}.")
     place = place_of(name, scene)

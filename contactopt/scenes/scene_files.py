@@ -86,7 +86,7 @@ def read_scene_file(path: str | Path, changes: Mapping[str, Any] | None = None) 
 def read_scenes(
     table: Callable[[], Table], path: Path
 ) -> tuple[tuple[Scene, ...], dict[str, Any], dict[str, int | str]]:
-    """As read_scene_file(), from a function that makes the table anew: states, options, lines."""
+    """As read_scene_file(), from a function that makes the table again: states, options, lines."""
     top = table()
     first, solve, reading = _scene(path, top, None)
     longest = max((length for length, _, _ in reading.lengths), default=1)

@@ -108,7 +108,7 @@ class PathResult:
 
     @property
     def solution(self) -> Solution:
-        """The last state's, with the seconds of the path, or how its last step failed."""
+        """The last state's solution with the seconds of the path, or how its last step failed."""
         seconds: Counter[str] = Counter()
         for own in self.solutions:
             seconds.update(own.seconds)

@@ -23,8 +23,9 @@ class Sliding(NamedTuple):
 
 
 def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None) -> Sliding | None:
-    """The free motion along which the load is more than friction bears, in a state that ended
-    without a solution, after a solved one, if any.
+    """The free motion along which the load exceeds what friction can hold; None without any.
+
+    The state `ended` without a solution; `before` is the solved state before it, if any.
 
     With unit displacements V of the contacts in a motion, the load along it has to meet the normal
     forces, sum V_n r_n, and the friction, at most sum b |V_t|, b the bounds of r_n.

@@ -36,7 +36,7 @@ from contactopt.solving.sliding import sliding, sliding_words
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
 # Steps of the default method, of which those of Newton and along interior paths are some forty,
-# until it is asked whether a state slides. One that does not begins anew, without this bound.
+# until it is asked whether a state slides. One that does not starts again, without this bound.
 FIRST_TRY = 64
 STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselves
 

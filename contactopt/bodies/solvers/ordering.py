@@ -68,8 +68,8 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
     """Permutation (n,) that eliminates both halves of a mesh before the nodes that separate them,
     and each half likewise.
 
-    Of the median planes across the axes the one with the fewest separating nodes cuts the nodes at
-    points (dim, n), whose graph (n, n) is a symmetric pattern.
+    The nodes at points (dim, n) are cut by the median plane, across one of the axes, that has the
+    fewest separating nodes. Their graph (n, n) is a symmetric pattern.
     """
     blocks = list(_dissected(graph, points))
     return np.concatenate(blocks[::-1]) if blocks else np.zeros(0, dtype=np.intp)

@@ -49,7 +49,7 @@ from contactopt.problem.certificate import Moved
 
 # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.large_punch`)
 USUAL = 8
-IDLE = 3  # steps without progress after which it begins anew
+IDLE = 3  # steps without progress after which it starts again
 
 
 class State(NamedTuple):
@@ -153,7 +153,7 @@ class CoupledAt:
 
 class CoupledSteps:
     """Newton's method on contacts and bodies. Where the residual does not fall for IDLE steps, a
-    rough start has led the sorting of contacts into a circle: it begins anew, once, from an
+    rough start has led the sorting of contacts into a circle: it starts again, once, from an
     accurate bonded solution.
     """
 

@@ -97,7 +97,7 @@ class Krylov:
         # The unknowns alpha are the amounts of the directions U in which a contact may still change
         # its force.
         U, delta, rho = _directions(at.D, equations.rho)
-        # B of the module's head; a proximal subproblem adds its weight to Q.
+        # B defined at the top; a proximal subproblem adds its weight to Q.
         added = (1 - delta) / (delta * rho) + equations.weight
         # dr0, the part of the step outside these directions, is known at once.
         known = error - U @ (U.T @ error)

@@ -221,8 +221,8 @@ class Law:
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Law:
-        """The law of the k contacts of a scene, from the values that it gives: friction
-        coefficients, unless the law says otherwise, one or (k,). InputError on another shape.
+        """The law of the k contacts of a scene. `values` are the scene's friction coefficients, or
+        what the law reads in their place: one number, or (k,). InputError on another shape.
         """
         if values.shape not in ((), place.areas.shape):
             raise InputError(
