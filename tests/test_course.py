@@ -37,8 +37,8 @@ CHAPTERS = {
 NUMBERS = [number for chapter in range(1, 8) for number in exercises(chapter)]
 # what somebody may try who has not read the question
 NUMBERS_AT_HAND = {
-    *np.arange(-20, 21) / 2,
-    *np.arange(-10, 11) / 5,
+    *range(-10, 11),
+    *np.arange(-5, 6) / 10,
     *(100.0, 1000.0, 1e6, np.pi, np.e, np.sqrt(2)),
 }
 

@@ -6,8 +6,6 @@ forces that solve the problem, those with the least friction are given: a corner
 pressure has this pressure, and no friction.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from dataclasses import replace
@@ -31,7 +29,6 @@ FEW = 600
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
 SEEN = 1e-6  # size of the friction of an exchange of size one that has some
-EVEN = 1e-3  # relative difference of pressures that are alike
 EMPTY = np.zeros(0, dtype=int)
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 
@@ -172,7 +169,7 @@ def _with_least(
     changed[normal] -= alone @ np.linalg.lstsq(scaled, pressed, rcond=None)[0]
     sizes = np.linalg.norm(scaled, axis=1)
     pressures = (changed[normal] * weight**2)[sizes > SEEN * sizes.max()]
-    uneven = np.ptp(pressures) > EVEN * np.abs(pressures).max()
+    uneven = np.ptp(pressures) > 1e-3 * np.abs(pressures).max()  # else they are alike
     return changed.reshape(r.shape), normal[[np.argmax(sizes)]] // problem.dim if uneven else EMPTY
 
 
