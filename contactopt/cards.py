@@ -16,9 +16,7 @@ FORCES = {
 
 
 def count(number: int, thing: str, things: str = "") -> str:
-    """Say a number of things in words that agree: '1 contact', '2 contacts'. The word for several
-    is that for one with an s, unless it is given.
-    """
+    """Say a number of things in words that agree: '1 contact', '2 contacts'."""
     return f"{number} {thing if number == 1 else things or thing + 's'}"
 
 

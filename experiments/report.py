@@ -80,14 +80,14 @@ def write(
 
 def save_figures(name: str, figures: dict[str, Any]) -> None:
     """Write the figures of a report alone: what `python -m experiments.questions.NAME figures` does
-    to draw them anew from the tables.
+    to draw them again from the tables.
     """
     for stem, figure in figures.items():
         save_figure(figure, REPORTS / name / f"{stem}.png")
 
 
 def figures_alone() -> bool:
-    """Whether the command asks to draw the figures anew and to measure nothing."""
+    """Whether the command asks to draw the figures again and to measure nothing."""
     return sys.argv[1:] == ["figures"]
 
 

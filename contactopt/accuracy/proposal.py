@@ -74,17 +74,13 @@ def propose(
 
 
 def half_space_fits(quantity: str, accuracy: float, size: float) -> bool:
-    """Whether a body of a size over the half-width of contact is a half-space to half of the
-    accuracy.
-    """
+    """Whether a body of a size over the half-width is a half-space to half of the accuracy."""
     error = SETTLING / size if quantity == "approach" else BODY / size**2
     return error <= accuracy / 2
 
 
 def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[str]:
-    """One sentence on what an accuracy takes, for a scene of one pair whose meshes are made for a
-    number of elements; none where there is no rule.
-    """
+    """One sentence on what an accuracy takes, for a scene of one pair; none without a rule."""
     if len(made.couplings) != 1 or any(part.given for part in scene.parts if part.elastic):
         return []
     own, edge = made.couplings[0], edge_of(scene, made)
@@ -119,9 +115,7 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
 
 
 def edge_of(scene: Scene, made: Posed) -> str:
-    """Where contact ends: 'free' if by itself, 'corner' if where a surface does, 'none' if the
-    surface turns around the body.
-    """
+    """Where contact ends: 'free' by itself, 'corner' with a surface, 'none' around a body."""
     own = made.couplings[0]
     size = float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
     if scene.zone is not None or float(np.ptp(own.gap)) > CLOSE * size:

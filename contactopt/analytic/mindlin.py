@@ -142,10 +142,7 @@ def cycle_loss_point(
 
 
 def masing_branches(loads: Sequence[float]) -> list[tuple[float, float]]:
-    """The part of a history of loads that still counts by Masing's rules: for each branch the
-    change of the load along it, and 1 on the first loading or 2 after a reversal. Closed loops are
-    forgotten.
-    """
+    """The branches of a history that still count by Masing's rules, each with its factor 1 or 2."""
     points = [0.0]
     for load in loads:
         if len(points) > 1 and (points[-1] - points[-2]) * (load - points[-1]) >= 0:

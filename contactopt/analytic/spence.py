@@ -64,9 +64,7 @@ class UnitPunch:
 
     @cached_property
     def _history(self) -> tuple[np.ndarray, np.ndarray]:
-        """int_v^inf of p / x^2 and q / x^2, dx, the last from 0; in the central panel without their
-        poles.
-        """
+        """int_v^inf of p / x^2 and q / x^2, dx, without their poles in the central panel."""
         v, central = self.panels.v, np.arange(len(self.p)) < LEFT
         p0, slope = (value * central for value in self.centre)
         p = (self.p * np.cosh(v) - p0) / np.sinh(v) ** 2

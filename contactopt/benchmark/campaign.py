@@ -171,7 +171,7 @@ def run_reports(
 
 
 def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:
-    """Run an experiment anew in a folder of `work`, and put its small table into `target`."""
+    """Run an experiment again in a folder of `work`, and put its small table into `target`."""
     try:
         experiment = read_experiment(path, quick)
     except NothingToRun as error:

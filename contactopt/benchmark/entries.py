@@ -14,8 +14,6 @@ from contactopt.checks import check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table
 
-LARGEST_INTEGER = 2**63  # of whole numbers, as in TOML
-
 
 class Entries:
     """Expands the tables below the keys of one file.
@@ -97,7 +95,7 @@ def _values_of(name: str, value: object) -> list[Any]:
         raise InputError(f"the list '{name}' is empty.")
     values = value if isinstance(value, list) else [value]
     for one in values:
-        large = isinstance(one, int) and abs(one) >= LARGEST_INTEGER
+        large = isinstance(one, int) and abs(one) >= 2**63  # of whole numbers, as in TOML
         if not isinstance(one, str | int | float) or large:
             raise InputError(
                 f"a value of '{name}' must be a text, a number, true or false; got {short(one)}."

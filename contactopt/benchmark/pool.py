@@ -188,8 +188,9 @@ class Shares:
 class History:
     """What earlier runs say of later ones.
 
-    A run that took longer than LONG, was refused or ended at its limit of time is not repeated. At
-    tighter tolerances a limit of time would end it too, so that these runs are not made.
+    A run that took longer than LONG, was refused or ended at its limit of time is not repeated, and
+    none along a sequence, whose time is a sum over many states. At tighter tolerances a limit of
+    time would end it too, so that these runs are not made.
     """
 
     def __init__(self, rows: Iterable[Mapping[str, Any]] = ()):
@@ -203,7 +204,7 @@ class History:
         key = row["problem"], row["method"]
         long = row["cpu_seconds"] > LONG or row["call_seconds"] > LONG_WAIT
         late = row["status"] in ("time_limit", "killed")
-        if long or late or row["status"] == "refused":
+        if long or late or row["states"] > 1 or row["status"] == "refused":
             self.once.add((*key, row["setting"]))
         if late:
             self.ended[key] = max(row["tolerance"], self.ended.get(key, 0.0))

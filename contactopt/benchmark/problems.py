@@ -80,9 +80,7 @@ class ProblemSpec:
                 raise InputError(f"family '{self.name}': {error}.") from error
 
     def build(self, declared: Mapping[str, Callable[..., Any]]) -> InterfaceProblem | Sequence:
-        """The problem, or a sequence; InputError on parameters that make none. `declared` as for
-        `check`.
-        """
+        """The problem, or a sequence; InputError on parameters that make none."""
         if self.kind == "scene":
             return reduced(self.name, **self.parameters)
         if self.kind == "fclib":

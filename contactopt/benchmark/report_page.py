@@ -231,9 +231,7 @@ def refusals(table: pd.DataFrame) -> list[str]:
 
 
 def _rendered(text: str, folder: Path) -> str:
-    """HTML of Markdown, with the pictures in `folder` embedded; raw HTML is shown as text, and
-    links to files become text, since the page may stand elsewhere.
-    """
+    """HTML of Markdown with pictures embedded; raw HTML and links to files become text."""
     from markdown_it import MarkdownIt
 
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")

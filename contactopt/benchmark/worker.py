@@ -210,9 +210,7 @@ def _along(call: Call, problem: InterfaceProblem | States, limit: float) -> Answ
 
 
 def _call(task: Task) -> Call:
-    """A method ready to be called with a problem, whether it starts from the answer to its last
-    problem, and a limit of time; it answers in whatever form. Its own errors pass through.
-    """
+    """A method to be called, whether it starts from its last answer, and a limit of time."""
     spec, usual = task.run.method, task.run.setting == "default"
     plugin = _kept.plugins.find(spec.name) if spec.foreign else None
     given: dict[str, Any] = {

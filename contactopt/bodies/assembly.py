@@ -129,7 +129,7 @@ class Assembly(Matrices):
 
     @property
     def degree(self) -> int:
-        """Of the displacement in every element, 1 or 2."""
+        """The degree of the displacement in every element, 1 or 2."""
         return 1 if self.unknowns.shape[1] == self.basis.mesh.nvertices else 2
 
     @cached_property

@@ -53,9 +53,7 @@ class BareSurface(NamedTuple):
 
 
 def ordered(points: np.ndarray, facets: np.ndarray, what: str) -> np.ndarray:
-    """The facets (f, j) with their corners first and cyclic, then the middles of their edges, from
-    (0, 1) on, then their centres. InputError where nodes in the middle are not.
-    """
+    """The facets (f, j): corners cyclic, then middles of edges from (0, 1) on, then centres."""
     (dim, _), count = points.shape, facets.shape[1]
     corners, facets = KINDS[dim, count][1], facets.copy()
     if (dim, count) == (2, 3):  # the middle may be named second
@@ -145,8 +143,8 @@ def bare_surface(
     every: bool,
     coupled: sp.csr_matrix | None,
 ) -> BareSurface:
-    """The trace of the displacement on facets (f, j) with outward normals (dim, f); `coupled` as of
-    turned_outwards, other arguments as of contactopt.bodies.elements.contact_trace.
+    """The trace of the displacement on facets (f, j) with outward normals (dim, f); `coupled` as in
+    turned_outwards, other arguments as in contactopt.bodies.elements.contact_trace.
     """
     dim, (kind, corners) = len(points), KINDS[len(points), facets.shape[1]]
     if (dim, facets.shape[1]) == (2, 3) and coupled is not None:

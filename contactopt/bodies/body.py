@@ -185,9 +185,7 @@ def _words(mesh: Mesh) -> str:
 
 
 def _check_pieces(part: Part, mesh: skfem.Mesh) -> None:
-    """Raise InputError unless every element can be reached from every other across facets, and
-    every node belongs to one.
-    """
+    """InputError unless facets connect all elements, and every node belongs to one."""
     inner = mesh.f2t[:, mesh.f2t[1] >= 0]
     piece = joined(inner, mesh.nelements)
     pieces = len(np.unique(piece))
@@ -219,8 +217,8 @@ def face_of(
     length = float(np.linalg.norm(normal))
     if length < CLOSED * area:
         raise InputError(
-            f"body '{part.name}': the normals of {boundary!r} point around, and have no mean along"
-            " which a bolt could pull; name a face with one side."
+            f"body '{part.name}': the normals of {boundary!r} have no mean along which a bolt could"
+            " pull, because the boundary is closed; name a face with one side."
         )
     held = _constraints(scene, part, basis)
     held.add_supports()

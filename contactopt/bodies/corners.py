@@ -173,9 +173,7 @@ def _bent(
 
 
 def _common(nodes: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (2, n) in the flattened nodes (f, j) that pairs (2, m) of facets share, and the nodes
-    (n,) there.
-    """
+    """Places (2, n) in the nodes (f, j) that pairs (2, m) of facets share, and these nodes (n,)."""
     same = nodes[pairs[0]][:, :, None] == nodes[pairs[1]][:, None]
     pair, first, second = np.nonzero(same)
     j = nodes.shape[1]
@@ -185,9 +183,7 @@ def _common(nodes: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def turns(normals: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """(k,) the largest difference between the normal at a contact, of (dim, k), and those beside it
-    in the cells (v, c).
-    """
+    """(k,) the largest difference of normals (dim, k) of contacts in one of the cells (v, c)."""
     turn = np.zeros(normals.shape[1])
     for corner, other in permutations(cells, 2):
         apart = np.linalg.norm(normals[:, corner] - normals[:, other], axis=0)

@@ -295,9 +295,7 @@ def _relief(body: Matrices, solver: BodySolver, kept: np.ndarray) -> np.ndarray:
 
 
 def _rigid_extension(body: Matrices) -> np.ndarray:
-    """The unit motions of the plates (n, p) with the free unknowns of the same component moved
-    along, unless a support holds another part of the body in that component.
-    """
+    """The unit motions of plates (n, p), with the free unknowns of their component moved along."""
     extended, fixed = body.motion.copy(), np.ones(len(body.load), dtype=bool)
     fixed[body.free] = False
     for column in extended.T:

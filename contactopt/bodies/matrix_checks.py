@@ -134,9 +134,7 @@ def check_isolated(name: str, K: sp.csr_matrix, held: np.ndarray) -> None:
 def free_motions_of(
     part: MatrixPart, K: sp.csr_matrix, held: np.ndarray, way: Numbering, names: tuple[str, ...]
 ) -> Motions:
-    """The free motions that are given, or the rigid ones that neither K nor what is held (n,)
-    resists, with the components' `names`.
-    """
+    """The given free motions, or the rigid ones that neither K nor what is held resists."""
     if part.solves is not None:
         return Motions(np.zeros((len(held), 0)), (), np.zeros(0, int), np.zeros((len(held), 0)))
     if part.motions is not None:

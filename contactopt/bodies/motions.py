@@ -55,9 +55,7 @@ class Motions:
 
 
 def work(fields: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """The resultants (m,) of nodal forces (n,) in motions (n, m); zero, where they balance each
-    other, in place of what rounding leaves.
-    """
+    """The resultants (m,) of nodal forces (n,) in motions (n, m), rounding made zero."""
     found = fields.T @ forces
     return np.where(np.abs(found) > BALANCED * (np.abs(fields).T @ np.abs(forces)), found, 0.0)
 
@@ -115,9 +113,7 @@ def motion_labels(components: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, with their
-    names; translations and rotations that are free by themselves are columns of their own.
-    """
+    """Combinations (m, j) of motions that leave held unknowns at rest, pure ones first; names."""
     count = len(labels)
     values, vectors = np.linalg.eigh(held.T @ held)
     kernel = vectors[:, values < ROUNDED * len(held)] if len(held) else np.eye(count)

@@ -11,7 +11,6 @@ from contactopt.errors import InputError
 SOFT = 1e-12  # of the scaled form: equations leave nothing free
 STIFF = 1e6  # of the equations, in the same scale
 BALANCED = 1e-11  # of the largest share in an equation, so much may be missing
-CORRECTIONS = 20  # of the multipliers, at most
 
 
 class LeastInBalance:
@@ -39,7 +38,7 @@ class LeastInBalance:
         K, C, slope, values = self._K, self._C, self._scale * slope, self._size * values
         x, multipliers, missed = np.zeros(len(slope)), np.zeros(len(values)), -values
         found = np.inf
-        for number in range(CORRECTIONS):
+        for number in range(20):  # of the multipliers, at most
             x -= self._factors.solve(K @ x + slope + C.T @ (multipliers + STIFF * missed))
             missed = C @ x - values
             multipliers += STIFF * missed

@@ -53,9 +53,7 @@ class SplitTriangle(NamedTuple):
 
 @cache
 def split_triangle(k: int, free: int | None = None) -> SplitTriangle:
-    """The stresses of degree k, 1 or 2; those that are zero along one edge where its tractions are
-    zero, if the vertex opposite this edge is given.
-    """
+    """The stresses of degree k; those without tractions on the edge opposite a given vertex."""
     parts, line = [_part(number, k) for number in range(3)], np.linspace(0, 1, k + 1)
     forwards = np.stack([1 - line, line, 0 * line])
     conditions = []

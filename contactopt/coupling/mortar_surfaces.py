@@ -103,9 +103,7 @@ def couple_surfaces(
 def _carried(
     sides: list[Faces], meshes: list[Mesh], carrier: str | None
 ) -> tuple[Mortar, float, int]:
-    """The contacts; how many of them there are for each node of a thin other side; and how many
-    are too many on held nodes.
-    """
+    """Contacts, how many there are per node of a thin other side, and how many too many."""
 
     def suits(made: Mortar) -> tuple[float, int]:
         return _per_node(made, sides, meshes), _crowded(made, sides, meshes)
@@ -132,9 +130,7 @@ def _held(made: Mortar, carrier: Faces, mesh: Mesh) -> np.ndarray:
 
 
 def _crowded(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> int:
-    """How many of the contacts that a support of their own side holds along the normal are more
-    than displacements of the other side can move independently.
-    """
+    """How many held contacts are more than the other side can move independently."""
     held, other = _held(made, sides[made.own], meshes[made.own]), meshes[1 - made.own]
     still = np.all(held | (np.abs(made.normals) <= ACROSS), axis=0)
     if not 0 < still.sum() <= MOST_HELD:
@@ -150,9 +146,7 @@ def _crowded(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> int:
 
 
 def _per_node(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> float:
-    """The least number of contacts per node, over the thin faces of the side that does not carry
-    them which these cover; 1 without any, and for linear elements, which hardly bend.
-    """
+    """The least number of contacts per node of covered thin faces of the other side, or 1."""
     other = 1 - made.own
     if sides[other].degree == 1:
         return 1.0

@@ -121,7 +121,7 @@ class Square:
 
 @dataclass(frozen=True, eq=False)
 class DenseFactors:
-    """The factors of this module's head, for an array Q.
+    """The factors defined at the top, for an array Q.
 
     order    (m,) equations and unknowns of M in the order of K;  known  how many are known
     scales   (2, m) diagonals of R and C in the order of M
@@ -228,9 +228,7 @@ def dense_factors(Q: np.ndarray, V: np.ndarray, rho: np.ndarray, D: np.ndarray) 
 
 
 def _sticking(Q: np.ndarray, kept: np.ndarray, stick: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The components (n,) that Cholesky's factor serves, and this factor: `stick`, or none if the
-    `kept` ones are few, or Q is not symmetric and safely positive definite.
-    """
+    """The components (n,) that Cholesky's factor serves, and this factor, or none of few ones."""
     none = np.zeros(len(Q), dtype=bool), np.zeros((0, 0))
     if np.count_nonzero(kept) <= WHOLE or not stick.any():
         return none

@@ -32,7 +32,6 @@ from contactopt.problem.laws.law import Kinks, Law
 STEP = 1e-7  # how far into a piece its derivative is read, over the largest force
 EXACT = 1e-6  # relative error of a one-sided derivative at the weakly active contacts
 STEPS, STARTS = 30, 200
-MOST = 600  # unknowns at weakly active contacts
 
 logger = logging.getLogger(__name__)
 Response = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -90,7 +89,7 @@ class Onesided:
         force: float,
         response: Response,
     ):
-        if len(contacts) * y.shape[1] > MOST:
+        if len(contacts) * y.shape[1] > 600:  # unknowns at weakly active contacts
             raise InputError(
                 f"{len(contacts)} contacts are weakly active, too many for one-sided derivatives;"
                 " solve the problem with a smaller tol, or give a smaller distance."

@@ -85,9 +85,7 @@ def _dense(numbers: _Numbers, n: int) -> np.ndarray:
 
 
 def _blocks(numbers: _Numbers, n: int) -> sp.csr_array:
-    """Blocks of compressed rows; ends of block rows and columns, pointers, indices, then number and
-    entries of each.
-    """
+    """Blocks of compressed rows: block ends, pointers, indices, then each with its entries."""
     count, *shape = numbers.integers(3).tolist()
     ends = [numbers.integers(size) for size in shape]
     for end in ends:

@@ -227,9 +227,7 @@ def _apart(
 def _motion(
     bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray, dim: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (s, k, dim) of places (k, 3), from the nearest node, and what closes gaps
-    there (1, k, dim); none without bodies.
-    """
+    """Displacements (s, k, dim) of places (k, 3) from the nearest node, and what closes gaps."""
     if not bodies:
         return np.zeros((1, len(points), dim)), np.zeros((1, len(points), dim))
     nearest = KDTree(np.concatenate([mesh.points for mesh in bodies.values()])).query(points)[1]
@@ -247,9 +245,7 @@ def _contact(
     path: dict[str, np.ndarray] | None,
     own: slice,
 ) -> dict[str, Any]:
-    """One pair of surfaces: places, their motion, and values of every state; the mean normal where
-    the pressure is, if the surface does not go around something.
-    """
+    """One pair of surfaces: places, motion, values of every state, and the mean normal if flat."""
     (block,) = mesh.cells
     line = block.type == "line"
     flat = np.zeros((0, 3), dtype=int) if line else triangles(block.data)

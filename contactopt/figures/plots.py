@@ -54,9 +54,7 @@ ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """The contacts (j,) along the first direction of a surface, in order; in 3D of the row nearest
-    to its origin. A closed line is cut opposite to its origin.
-    """
+    """The contacts (j,) in order along a surface; in 3D of the row nearest to its origin."""
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
     if problem.dim == 3:
@@ -98,9 +96,7 @@ def _singular(scene: Scene) -> bool:
 def pressure(
     scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Axes | None = None
 ) -> Any:
-    """Contact pressure over its mean, with the exact curve, against position, over the half-width
-    where the zone lies about the origin.
-    """
+    """Contact pressure over its mean, with the exact curve, against position or position / a."""
     ax, (length, stress) = make_axes(ax), scene.units
     if not _in_rows(problem):
         values = solution.reactions[:, 0] / problem.areas
@@ -224,9 +220,7 @@ def _plane(scene: Scene, problem: InterfaceProblem, ax: Axes) -> None:
 def stick_map(
     scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Axes | None = None
 ) -> Any:
-    """Sticking, slipping and open nodes of a 3D contact, with the tangential traction as arrows, of
-    which the longest is three times their distance.
-    """
+    """Sticking, slipping and open nodes in 3D, with the tangential traction as arrows."""
     ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
@@ -256,9 +250,7 @@ def stick_map(
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Pressure above tangential traction of one pair, with the map of stick and slip in 3D. The
-    title has a status where the problem was not solved.
-    """
+    """Pressure above tangential traction of one pair, with the map of stick in 3D."""
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
     placed = problem.dim == 3
@@ -327,9 +319,7 @@ def convergence(solutions: dict[str, Solution], ax: Axes | None = None) -> Any:
 
 
 def refinement_figure(estimate: Estimate) -> Any:
-    """Over the unknowns of each mesh: estimated errors with the target, and the value with its
-    estimated error. The dotted line is the last value corrected.
-    """
+    """Estimated errors with the target, and the value, over the unknowns of each mesh."""
     from matplotlib.ticker import NullFormatter
 
     figure, (left, right) = paper_axes(2, wide=True)

@@ -26,9 +26,7 @@ MARKS = "#*o+x%@&"
 
 
 def describe(name: str, changes: dict[str, Any]) -> str:
-    """Write the sheet of a named scene, with other values of its arguments, or of a scene file.
-    InputError for an unknown scene or argument, and for a scene file with a mistake.
-    """
+    """Write the sheet of a named scene or scene file; InputError for what is unknown or wrong."""
     if name.endswith(".toml"):
         from contactopt.scenes.scene_files import read_scene_file
 
@@ -62,9 +60,7 @@ def describe(name: str, changes: dict[str, Any]) -> str:
 
 
 def _argument_lines(name: str) -> list[str]:
-    """The docstring of the function that makes the scene, and its arguments with their values;
-    those of its load path, too.
-    """
+    """The docstring of the scene's function, its arguments and those of its load path."""
     module = SCENES[name][0]
     fixed = SCENES[name][-1] if isinstance(SCENES[name][-1], dict) else {}
     makers = [

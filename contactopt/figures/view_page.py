@@ -37,9 +37,7 @@ WORDS = {
 
 
 def write_page(folder: str | Path, file: str | Path) -> Path:
-    """Write the page of a run, from the files that `contactopt run` wrote into its folder, to an
-    .html file. InputError if the folder is not that of a run.
-    """
+    """Write the page of a run from its folder; InputError if it is none."""
     folder = Path(folder)
     try:
         silent = io.StringIO()

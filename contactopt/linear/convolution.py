@@ -32,9 +32,7 @@ Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 
 
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
-    """The size M of the padded grid on which a convolution is transformed, along each axis: twice a
-    number that is at least that of the contacts and easy to halve and to transform.
-    """
+    """The size M, easy to transform, of the padded grid along each axis: twice that of the grid."""
     from scipy.fft import next_fast_len
 
     return tuple(
@@ -71,9 +69,7 @@ class Kernel:
 
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
-        """Make a kernel from K_ab [length / force] at distances 0 to M / 2 along each axis, with M
-        as `embedding` gives it, for pairs of components a <= b.
-        """
+        """From K_ab [length / force], a <= b, at distances 0 to M / 2 along each axis."""
         from scipy.fft import dct, dst
 
         padded, symbols = embedding(grid), {}
@@ -199,9 +195,7 @@ class Kernel:
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
-    """Transform real values on a grid, padded by zeros to (M0[, M1]), in their precision, to (M0 /
-    2 + 1,) or (M0, M1 / 2 + 1); rows of padding are skipped.
-    """
+    """The transform of real values on a grid, padded by zeros to (M0[, M1]), in their precision."""
     from scipy.fft import fft, rfft
 
     workers = _workers_for(padded)

@@ -30,17 +30,13 @@ def time_left() -> float:
 
 
 def enough() -> float:
-    """The residual at which the solve ends over the present one: what the step that runs may leave.
-    It is 0 where all digits are asked for, and before a residual is known.
-    """
+    """The share of the present residual that a step may leave; 0 where all digits are asked for."""
     return _enough.get()
 
 
 @contextmanager
 def until(moment: float, enough: float = 0.0) -> Iterator[None]:
-    """Set the deadline, a time.perf_counter() [s], in the block, where an earlier one stays, and
-    the share of the present residual that is small enough.
-    """
+    """Set the deadline [s of perf_counter] in the block, and the share of the residual to reach."""
     tokens = _deadline.set(min(moment, _deadline.get())), _enough.set(enough)
     try:
         yield

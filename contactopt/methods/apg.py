@@ -29,8 +29,6 @@ from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Projected
 
-INNER = 2000  # products with Q in one subproblem
-
 
 @dataclass(frozen=True)
 class APG(Method):
@@ -68,7 +66,7 @@ def accelerate(
 ) -> Iterate:
     """Minimise a quadratic over the set of prox until a step moves r by `accuracy` at most."""
     y, momentum = r, 1.0
-    for _ in range(INNER):
+    for _ in range(2000):  # products with Q in one subproblem
         check_time()
         new, lam = prox(y - step * gradient(y), lam)
         move, along = new - y, new - r

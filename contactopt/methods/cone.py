@@ -87,7 +87,7 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
 def cone_program(
     problem: InterfaceProblem, bridge: str, backend: str
 ) -> Callable[[np.ndarray], Iterate]:
-    """The cone program of the module's head, from the opening mu s (k,) [length] to its answer."""
+    """The cone program defined at the top, from the opening mu s (k,) [length] to its answer."""
     V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
         from contactopt.models import acary_cadoux

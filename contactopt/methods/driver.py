@@ -241,9 +241,7 @@ def _follow(
 def _next(
     steps: Iterator[Iterate | Known], left: float, repeated: Status | None, enough: float
 ) -> tuple[Iterate | Known | None, Status | None, str, Infeasible | None]:
-    """The next iterate with `left` seconds to go, or how and why the iteration ended, with a proof
-    if there is no solution. `enough` is the share of the residual that may be left.
-    """
+    """The next iterate, or how and why the iteration ended, with a proof if nothing solves it."""
     try:
         # what overflows is seen below
         with np.errstate(all="ignore"), until(time.perf_counter() + left, enough):

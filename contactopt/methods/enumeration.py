@@ -40,8 +40,8 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
 
     Returns
     -------
-    The solutions, each certified; an empty list if there is none. Of a continuum of solutions with
-    the same states one is listed.
+    The solutions, each certified; an empty list if there is none. If a
+    continuum of solutions has the same states, one of them is listed.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 """Forces that contacts around one place can exchange: at a corner of 90 degrees four components of
 two forces move one node in two directions.
 
-Such forces y, with Q y = 0 and V' y = 0, change neither displacements nor balance. Of all forces
-that hold there, those with the least friction are given: a corner under constant pressure has this
-pressure, and no friction.
+Such forces y, with Q y = 0 and V' y = 0, change neither displacements nor balance. Among all
+forces that solve the problem, those with the least friction are given: a corner under constant
+pressure has this pressure, and no friction.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ HARDER, ROUNDS, NEWTON, EPS = 10.0, 12, 60, 1e-14
 
 
 def may(problem: InterfaceProblem) -> bool:
-    """Whether contacts are at one place, or those of one pair of surfaces next to those of another
-    one: no farther than three times the largest way from a contact to the nearest one of its pair.
+    """Whether contacts are at one place, or contacts of two pairs are neighbours: within three
+    times the largest spacing.
     """
     if problem.shared_places:
         return True
@@ -61,9 +61,7 @@ def may(problem: InterfaceProblem) -> bool:
 
 
 def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) -> Solution:
-    """The solution with the least friction at every place where contacts can exchange forces, its
-    certificate at most `tol`, and a note of a place where this leaves some, or several solutions.
-    """
+    """The solution with the least friction where contacts exchange forces, and a note about it."""
     points, places = problem.coordinates.T, problem.shared_places
     known, left, corners = has_entries(problem.Q), [], np.concatenate([*places, EMPTY])
     alone = known  # whether each place is looked at by itself
@@ -96,16 +94,14 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
 
 
 def _most_friction(solution: Solution, at: np.ndarray) -> np.ndarray:
-    """Of some contacts the one with the largest friction."""
+    """The one with the largest friction among some contacts."""
     return at[[np.argmax(np.linalg.norm(solution.reactions[at, 1:], axis=1))]]
 
 
 def _exchanged(
     problem: InterfaceProblem, solution: Solution, tol: float, near: np.ndarray, at: np.ndarray
 ) -> tuple[Solution, np.ndarray]:
-    """The solution with the least friction that some contacts can exchange, and where this leaves
-    some, at the contacts `at`, or several solutions.
-    """
+    """The solution with the least friction that contacts exchange; where some or several stay."""
     r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
     fixed = problem.law.lowest < 0
     felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())
@@ -129,9 +125,8 @@ def _exchanged(
 def exchanges(
     problem: InterfaceProblem, contacts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The unknowns (m,) of the forces of some contacts, an orthonormal basis (m, j) of those
-    changes y of them that the bodies hardly feel, if at all, and the relative sizes (j,) of Q y and
-    V' y.
+    """Unknowns (m,) of some contacts' forces, a basis (m, j) of changes y that the bodies hardly
+    feel, and the relative sizes (j,) of Q y and V' y.
     """
     Q, dim = problem.Q, problem.dim
     free = np.zeros((problem.contacts, dim), dtype=bool)
@@ -154,9 +149,7 @@ def exchanges(
 
 
 def _shortened(matrix: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
-    """An orthonormal basis of those directions that a matrix shortens to `least` or less, and to
-    what.
-    """
+    """Orthonormal directions that a matrix shortens to `least` or less, and to what."""
     sizes, directions = np.linalg.svd(matrix, full_matrices=len(matrix) < matrix.shape[1])[1:]
     sizes = np.pad(sizes, (0, matrix.shape[1] - len(sizes)))
     return directions[sizes <= least].T, sizes[sizes <= least]
@@ -185,7 +178,7 @@ def _with_least(
 
 
 def _weights(problem: InterfaceProblem) -> np.ndarray:
-    """(k, dim) the roots of the weights of squared forces in what is least: friction above all."""
+    """(k, dim) roots of the weights of squared forces in the sum that is least."""
     weight = np.ones(problem.q.shape)
     weight[:, 0] = np.sqrt(LAST * problem.areas.mean() / problem.areas)
     return weight
@@ -238,8 +231,8 @@ def _within(
 def _allowed(
     problem: InterfaceProblem, solution: Solution, contacts: np.ndarray, ways: np.ndarray
 ) -> np.ndarray:
-    """A basis of those combinations of changes (k, dim, j) of forces that stay on the ray of each
-    contact that slips, and are zero at each one that is open.
+    """Combinations of changes (k, dim, j) of forces that stay on the ray of each contact that slips,
+    and are zero at open ones.
     """
     u = problem.displacements(solution.reactions, solution.multipliers)
     felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())

@@ -41,9 +41,7 @@ def collected() -> Iterator[list[str]]:
 
 
 def remark(problem: InterfaceProblem, solution: Solution) -> None:
-    """Say where the forces of a small problem may be far off although they are certified. Forces
-    that contacts at one place exchange are contactopt.methods.exchanged's to speak of.
-    """
+    """Say where the forces of a small problem may be far off although they are certified."""
     at, loose = solution, solution.solved and solution.residual > EXACT
     if not loose or problem.contacts > FEW or form(problem.Q) != "array":
         return

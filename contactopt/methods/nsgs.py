@@ -33,8 +33,6 @@ from contactopt.problem.laws.law import Law
 
 ROOT = 1e-14  # relative accuracy of the local slip problem
 STEPS = 60  # Newton or bisection steps for it
-PENALTY = 10.0  # tau V'V
-OFTEN = 100  # contacts between two looks at the clock
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ class NSGS(Method):
                 sweeps(r, 1, self.relaxation)
                 yield r.copy(), lam
         flat = r.reshape(-1)  # a view: changes with r
-        tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
+        tau = 10.0 / np.maximum(np.sum(V**2, axis=0), 1e-300)  # tau V'V
         motions = V.reshape(k, dim, -1)
         rows = [_coupling(problem.Q, dim, i) for i in range(k)]
         bounds = zip(rows, motions, problem.mu, problem.law.lowest == 0)
@@ -77,7 +75,7 @@ class NSGS(Method):
             w = problem.q + (V @ (lam + tau * s)).reshape(k, dim)
             pushed = V.T @ flat
             for i, (local, (others, Q, _), T) in enumerate(zip(contacts, rows, motions)):
-                if i % OFTEN == 0:
+                if i % 100 == 0:  # contacts between two looks at the clock
                     check_time()
                 old = r[i].copy()
                 moved = Q @ flat[others] + w[i]

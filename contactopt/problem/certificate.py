@@ -99,7 +99,7 @@ class Yardsticks:
     rho: np.ndarray
 
     def errors(self, law: Law, r: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """e_i (k,) of the head of this module, for forces r and displacements u, both (k, dim)."""
+        """e_i (k,) as defined at the top, for forces r and displacements u, both (k, dim)."""
         return lengths(r - law.mapped(r - self.rho[:, None] * u)) / self.force
 
 
@@ -159,9 +159,7 @@ def natural_map_residual(
 def yardsticks(
     problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray
 ) -> Yardsticks:
-    """Force F, length L and steps rho, as at the top of this module, for forces r and the finite
-    displacements d = Q r and w = q + V lambda, all (k, dim).
-    """
+    """Force F, length L and steps rho, as above, for r and finite d = Q r and w = q + V lambda."""
     size, gap = lengths(r), w[:, 0]
     largest = float(size.max())
     weight = np.minimum(1.0, size / (ACTS * largest)) if largest > 0 else np.zeros(len(r))
@@ -299,9 +297,7 @@ def siconos_residual(
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """The multipliers (p,) that fit reactions best: least squares on u_n where pressed, u_t where
-    sticking; zeros where no displacement must vanish.
-    """
+    """The multipliers (p,) that fit best: u_n = 0 where pressed, u_t = 0 where sticking."""
     r = np.asarray(reactions, dtype=float)
     rows = np.repeat(problem.law.sticking(r)[:, None], problem.dim, axis=1)
     rows[:, 0] = problem.law.pressed(r)

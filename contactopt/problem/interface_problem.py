@@ -230,9 +230,7 @@ class InterfaceProblem:
 
     @cached_property
     def shared_places(self) -> list[np.ndarray]:
-        """The contacts at every place that has several, where the pairs of surfaces have names:
-        matrices alone tell of no surface that meets another.
-        """
+        """The contacts at each place that has several, if the pairs have names."""
         x = self.coordinates
         if x.shape[1] != self.contacts or self.contacts < 2 or self.pairs[0].name == UNNAMED:
             return []

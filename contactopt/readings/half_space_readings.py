@@ -93,9 +93,7 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
 
 
 def surface_maps(reduction: Reduction, solution: Solution) -> dict[str, np.ndarray]:
-    """Pressure, traction, gap, slip and status (0 open, 1 stick, 2 slip) on the grid (n0[, n1]) of
-    a half-space. InputError if the scene has none.
-    """
+    """Pressure, traction, gap, slip and status (0 open, 1 stick, 2 slip) on a half-space's grid."""
     found = [body for body in reduction.bodies if isinstance(body, HalfSpaceBody)]
     if not found:
         raise InputError(

@@ -79,9 +79,7 @@ def ellipse(force: float, modulus: float, small: float, large: float) -> tuple[f
 
 
 def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz]:
-    """The prediction for each pair that is curved and whose force statics give, by its name; `free`
-    has the rigid motions that supports leave.
-    """
+    """The prediction, by name, for each curved pair whose force follows from statics."""
     from scipy.optimize import nnls  # late, since it takes long to import
 
     pairs = zip(free.pairs, posed.couplings)

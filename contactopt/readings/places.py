@@ -88,9 +88,7 @@ class StressReading(Reading):
 
 
 def place_of(name: object, scene: Scene) -> Place | None:
-    """The quantity at a place that has a name; None for other quantities. InputError for a body,
-    pair, component or point that the scene does not have.
-    """
+    """The quantity at a place, by its name, or None; InputError for what the scene lacks."""
     if not isinstance(name, str):
         return None
     head, at, where = name.partition("@")
@@ -234,9 +232,7 @@ def read_stress(
 
 
 def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tuple[int, StressMap]:
-    """The number of the body, and its recovered stress in the region of a quantity as a linear map
-    of the displacement, or the derivative of that map by Poisson's ratio.
-    """
+    """The body's number, and its recovered stress as a map of U, or that derived by nu."""
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = stress_map(reduction.bodies[number], place.region, by_poisson)
     if recovered is None:
@@ -289,9 +285,7 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
 
 
 def read_place(place: Place, reduction: Reduction, solution: Solution) -> Reading:
-    """Read a quantity at a place, with its uncertainty [stress]: of a pressure what nodes scatter
-    about a linear function. A reading without contact nearby says so.
-    """
+    """Read a quantity at a place, and its uncertainty [stress]: of pressure the scatter."""
     if place.kind != "pressure":
         return read_stress(place, reduction, reduction.displaced(solution))
     weights, problem, r = pressure_weights(place, reduction), reduction.problem, solution.reactions

@@ -22,7 +22,6 @@ from contactopt.problem import Solution
 if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
 
-CLOSED = 1e-3  # a mean direction shorter than this is that of a surface around a body
 TINY = 1e-15  # share of the extent of the contacts below which a motion is rounding
 
 
@@ -36,9 +35,7 @@ class Motion(NamedTuple):
 
 
 def approach(reduction: Reduction, solution: Solution) -> float | None:
-    """How far the plates bring the bodies together along the mean normal [length]; None without a
-    plate, or where normals have no mean.
-    """
+    """How far plates bring bodies together along the mean normal [length]; None without either."""
     if not any(_has_plate(part) for part in reduction.scene.parts):
         return None
     found = motion(reduction, reduction.displaced(solution), 0)
@@ -64,8 +61,9 @@ def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Mo
 
 
 def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
-    """Of each side the bodies count that plates or supports hold or move, component by component,
-    else all. Both sides have one direction, so that no translation of the whole scene counts.
+    """On each side only the bodies count that plates or supports hold or move, component by
+    component; without any, all count. Both sides have one direction, so that no translation of
+    the whole scene counts.
     """
     scene, problem = reduction.scene, reduction.problem
     names = [part.name for part in scene.parts]
@@ -84,7 +82,7 @@ def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
     areas = _of_those(np.asarray(counted), problem.areas)
     mean = _along_symmetry(reduction, areas @ frames / areas.sum(), component)
     length = float(np.linalg.norm(mean))
-    if length < CLOSED:
+    if length < 1e-3:  # a mean direction shorter than this is that of a surface around a body
         return None if component == 0 else made
     if component == 0:
         whole = np.array([areas[own.contacts] @ frames[own.contacts] for own in problem.pairs])

@@ -23,7 +23,6 @@ from contactopt.scenes.scene import Part, Scene
 SHARE = 0.02
 STIFFEST, SOFTEST = 1.3e12, 1e2  # Young's moduli [Pa]: above that of diamond, below that of gels
 FAINT = 1e-9  # stress of a load over Young's modulus: no load on a solid strains it less
-STIFFER = 3e5  # ratio of Young's moduli: that of steel to soft rubber is 1e5
 LARGER = 300.0  # ratio of sizes: metres beside millimetres, of bodies up to three times as large
 
 UNPUSHED = (
@@ -39,9 +38,9 @@ def doubts(
     states: Sequence[Scene] = (),
     bears: Callable[[int, str], bool] = lambda number, boundary: True,
 ) -> list[str]:
-    """One sentence for everything about a scene that is probably not as it is meant; `planes` are
-    those of symmetry, `states` the scenes of its load path, if it has one, and `bears` says whether
-    a force acts on a supported boundary of the body with a number, where that is known.
+    """One sentence for each thing in a scene that is probably a mistake. `planes` are the planes of
+    symmetry, `states` the scenes of its load path, if it has one. bears(body, boundary) says
+    whether a force acts on this supported boundary of the body of this number.
     """
     meshed = [part for part in scene.meshed.values() if part.given]
     found = [note for part in meshed for note in _loaded_contacts(scene, part)]
@@ -157,7 +156,7 @@ def _stiffness(scene: Scene) -> list[str]:
     for names in combinations(moduli, 2):
         soft, stiff = sorted(names, key=lambda name: moduli[name][0])
         ratio = moduli[stiff][0] / moduli[soft][0]
-        if ratio > STIFFER:
+        if ratio > 3e5:  # ratio of Young's moduli: that of steel to soft rubber is 1e5
             notes.append(
                 f"body '{stiff}' is {ratio:.1e} times as stiff as '{soft}': are both given in the"
                 " same unit? A body that does not deform can be a rigid one."

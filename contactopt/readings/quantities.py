@@ -75,9 +75,7 @@ class Quantity:
 
 
 def find_quantity(name: object, scene: Scene) -> Quantity:
-    """Find a quantity by its name in this module's head, before anything is solved. InputError for
-    what the scene does not have.
-    """
+    """Find a quantity by a name listed at the top; InputError for what the scene lacks."""
     if not isinstance(name, str):
         raise InputError(f"a quantity is given by its name; got {name!r}.")
     place = place_of(name, scene)
@@ -105,9 +103,7 @@ def unit_of(name: str, units: tuple[str, str]) -> str:
 
 
 def quantity_of_states(name: object, states: Sequence[Scene]) -> Quantity:
-    """As `find_quantity`, for a scene or the states of its load path: InputError also for a
-    quantity of paths where there is one state only.
-    """
+    """As `find_quantity`; InputError for a quantity of paths where there is one state."""
     found = find_quantity(name, states[-1])
     if found.column and len(states) == 1:
         raise InputError(
@@ -118,9 +114,7 @@ def quantity_of_states(name: object, states: Sequence[Scene]) -> Quantity:
 
 
 def seeds_of(quantity: object, state: State) -> Seeds:
-    """The value of a quantity of a solved state and its derivatives, by its name or as a function
-    of the state that returns Seeds.
-    """
+    """The value and derivatives of a quantity of a solved state, by name or as a function of it."""
     if callable(quantity):
         return quantity(state)
     return find_quantity(quantity, state.reduction.scene).slopes(state)

@@ -51,9 +51,7 @@ def of_width(state: State, pair: int) -> Seeds:
 
 
 def of_stick(state: State, pair: int) -> Seeds:
-    """Half-width of the stick zone over that of contact, by forces at closed contacts, slip and
-    bounds, while contacts keep their states. A slipping contact stays at its bound.
-    """
+    """Half-width of stick over contact, by forces, slip and bounds, while states stay the same."""
     reduction, solution = views(state.reduction, state.solution)[pair]
     scene, problem, r = reduction.scene, reduction.problem, solution.reactions
     u, d = problem.displacements(r, solution.multipliers), problem.dim

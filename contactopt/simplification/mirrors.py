@@ -67,7 +67,7 @@ def _why(images: Images) -> str:
     """Why one half is enough, and what the numbers of the half stand for."""
     text = (
         f"Meshes, supports, loads, gaps and laws are their own mirror images. {UNIQUE} Forces and"
-        " areas stay those of the whole"
+        " areas stay those of the whole scene"
     )
     if any(name != image for name, image in images.pairs.items()):
         return f"{text}; a contact that stands for itself and its image carries the forces of both."

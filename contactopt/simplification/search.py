@@ -57,9 +57,7 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
 
 
 def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | None]:
-    """What is left of a scene after all simplifications that are proved, and its solution on that
-    scene's own mesh, or None. The note of the options is told what was found.
-    """
+    """What all proved simplifications leave of a scene, solved on its own mesh, or None."""
     notes: list[str] = []
     chain: list[Simplification] = []
     part = None

@@ -100,9 +100,7 @@ def follow_path(
 def _next_state(
     scene: Scene, named: str, solved: Solved, states: list[State], options: Options
 ) -> Solved:
-    """The next state of a path; an InputError names it, and a load that nothing holds comes with
-    the path so far.
-    """
+    """The next state of a path; errors name it, or bring the path so far."""
     try:
         return solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
     except InputError as error:

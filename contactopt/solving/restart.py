@@ -55,9 +55,7 @@ class Known:
     complete: bool
 
     def start(self, state: int, reduction: Reduction) -> Solution | None:
-        """The forces of a state, the last one for -1, at the contacts of a reduction: those of
-        pairs of the same name, interpolated in space; none for a state that is not known.
-        """
+        """The forces of a state at the contacts of a reduction, interpolated in space, or None."""
         if state >= len(self.reactions):
             return None
         problem, r = reduction.problem, self.reactions[state]
@@ -160,9 +158,7 @@ class Restart:
     pause: float = PATIENCE
 
     def begin(self, reduction: Reduction) -> None:
-        """A state of this reduction will be solved. On another mesh than the one before it is the
-        first state.
-        """
+        """A state of this reduction will be solved, the first one on a new mesh."""
         if self.reduction is None or reduction.couplings is not self.reduction.couplings:
             self.done = []
         self.reduction, self.now = reduction, None

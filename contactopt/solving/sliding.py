@@ -27,8 +27,9 @@ class Sliding(NamedTuple):
 
 
 def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None) -> Sliding | None:
-    """The free motion along which the load is more than friction bears, in a state that ended
-    without a solution, after a solved one, if any.
+    """The free motion along which the load exceeds what friction can hold; None without any.
+
+    The state `ended` without a solution; `before` is the solved state before it, if any.
 
     With unit displacements V of the contacts in a motion, the load along it has to meet the normal
     forces, sum V_n r_n, and the friction, at most sum b |V_t|, b the bounds of r_n.
@@ -88,9 +89,7 @@ def unheld_words(
 
 
 def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
-    """One sentence on a state that slides, after the state `before`; without one the forces are
-    known too badly to say what friction holds.
-    """
+    """One sentence on a state that slides, after the state `before`, unless that is none."""
     force, most = _unit(scene, found.motion), float(f"{found.most:.3g}")
     load = f"the load along {found.motion} is {found.load:.6g} {force}"
     held = "more than friction holds"

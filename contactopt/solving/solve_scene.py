@@ -38,7 +38,7 @@ from contactopt.solving.sliding import sliding, sliding_words
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
 # Steps of the default method, of which those of Newton and along interior paths are some forty,
-# until it is asked whether a state slides. One that does not begins anew, without this bound.
+# until it is asked whether a state slides. One that does not starts again, without this bound.
 FIRST_TRY = 64
 STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselves
 
@@ -165,9 +165,7 @@ def _one_way(
     once: bool,
     made: Posed,
 ) -> Solved:
-    """The scene whose bodies are `made` solved by the way that the options name, or the cheapest
-    one; TooDear where that takes many more steps than expected.
-    """
+    """The scene with `made` bodies, solved by the named or cheapest way; TooDear if it is slow."""
     reduction = reduce_bodies(
         scene, elements, zone, options.Q, options.solver, once=once, made=made
     )
@@ -248,9 +246,7 @@ def _solved(
 
 
 def _knowing(reduction: Reduction, solution: Solution, tol: float) -> Reduction:
-    """With a Q that need not look for the displacements again that came with the forces of the
-    solution. Where the solution was to be less accurate than usual, so are they.
-    """
+    """With a Q that knows the displacements of the solution, as accurately as it was asked for."""
     problem = reduction.problem
     if solution.displacements is None:
         return reduction
@@ -271,9 +267,7 @@ def _on_ground(
     start: Solution | None,
     answer: Callable[[InterfaceProblem, Solution | None], Solution],
 ) -> tuple[Reduction, Solution]:
-    """The answer for thin bodies, which a ground holds until it bears nothing or no longer gets
-    less to bear.
-    """
+    """The answer for thin bodies, held by a ground until it bears nothing or no less."""
     before = np.inf
     solution = answer(held.problem, start)
     seconds = Counter(solution.seconds)

@@ -70,9 +70,7 @@ def settling(
     points: int = 1,
     warm: bool = False,
 ) -> Sequence:
-    """A shaken packing that comes to rest under its weight: implicit steps of time of length one,
-    with the contacts of its first place; each step begins with the velocities of the last one.
-    """
+    """A shaken packing that comes to rest: implicit steps of time one at its first contacts."""
     W, fall, shaken, gaps = parts_of_packing(dim, bodies, seed, points=points)
     velocity, law = shaken, Coulomb(np.full(len(gaps), mu))
 

@@ -37,7 +37,7 @@ NULL = 1e-14  # share of the largest eigenvalue of P below which one counts as z
 
 @dataclass(frozen=True, eq=False)
 class ConvexProgram:
-    """The program of this module's head, of n unknowns and m cones.
+    """The program defined at the top, of n unknowns and m cones.
 
     P (n, n), c (n,), A (p, n), b (p,), lower (n,) with -inf where there is no bound;
     T (m, d) positions of the components that a cone bounds; R (m, n), g (m,) its bound

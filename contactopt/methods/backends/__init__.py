@@ -56,9 +56,7 @@ class Backend:
         return dict(self.settings) | ({self.clock: left} if self.clock and isfinite(left) else {})
 
     def rounds(self) -> Iterator[dict[str, Any]]:
-        """Settings for one try after another, each of more iterations, as many as fit into the time
-        that is left: one for a backend with a clock, with few iterations, or without a time limit.
-        """
+        """Settings for one try after another, of more iterations, within the time that is left."""
         if not self.steps or not isfinite(time_left()):
             yield self.timed()
             return

@@ -53,9 +53,7 @@ def coulomb_equations(
 
 
 def admissible(problem: InterfaceProblem, r: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Forces within the bounds of the law to the last digit, P(y) = r + error. Where thin bodies
-    are so soft that P(y) would displace by the rounding of u, r is projected instead.
-    """
+    """Forces within the bounds: P(y) = r + error, or P(r) where P(y) would displace by rounding."""
     if len(problem.pairs) == 1:
         return r + error
     return problem.law.nearest(r, np.maximum(r[:, 0], problem.law.lowest))

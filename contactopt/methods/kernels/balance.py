@@ -24,7 +24,6 @@ SURE = 1e-6  # error of the balance, over all friction bounds, with which a moti
 STEPS = 50  # of Newton's method
 # by how much friction grows faster with the slip from one convex problem to the next
 SHARPER = 100.0
-SEARCH = 200  # evaluations of one line search
 EXACT = 1e-13  # relative error of the balance at which the search ends
 # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
 CURVATURE = 1e-10
@@ -79,7 +78,7 @@ def project_balanced(
 def _least(slope: Callable[[float], float], first: float) -> float:
     """The t > 0 where a slope that grows from `first` < 0 vanishes; 0 if not above rounding."""
     low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
-    for trial in range(SEARCH):
+    for trial in range(200):  # evaluations of one line search
         value = slope(t)
         if abs(value) <= 0.1 * abs(first):
             return t
@@ -100,9 +99,7 @@ def _least(slope: Callable[[float], float], first: float) -> float:
 
 
 def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Orthonormal combinations (p, j) of the motions V that no closed contact holds along its
-    normal and no sticking one at all, by the derivative D (k, d, d) of the law's map.
-    """
+    """Orthonormal combinations (p, j) of V that closed and sticking contacts leave free."""
     d = D.shape[1]
     firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
     firm[:, 0] = np.any(D != 0, axis=(1, 2))

@@ -99,9 +99,7 @@ _last: list[tuple[weakref.ref[InterfaceProblem], Bonded]] = []
 
 
 def bonded(problem: InterfaceProblem) -> Bonded | None:
-    """The factors of a dimensionless problem, or None. They are kept for derivatives, until another
-    problem is factorised or the one that was made dimensionless is gone.
-    """
+    """The factors of a dimensionless problem, kept while it lives, or None."""
     try:
         made = Bonded(problem.Q, problem.V)
     except la.LinAlgError:

@@ -20,9 +20,7 @@ from contactopt.problem import InterfaceProblem
 
 
 def eliminated(level: Level, at: Evaluation) -> Evaluation:
-    """Solve the contacts that make most of the residual by themselves, and return the errors with
-    these forces; the same ones where they are spread widely or do not fall.
-    """
+    """Solve alone the contacts that make most of the residual; returns errors and forces."""
     some = _worst(level, at)
     if not len(some) or len(level.components) < level.kernel.dim:
         return at

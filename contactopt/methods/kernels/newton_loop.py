@@ -49,10 +49,7 @@ class System(Protocol, Generic[At]):
 
 
 def newton_iterates(system: System[At], at: At, damped: bool = False) -> Iterator[At]:
-    """Newton's iterates from the evaluation `at`, until a linear system cannot be solved. With
-    `damped` a step is halved until its residual is below the worst of the last MEMORY ones, down to
-    SHORTEST.
-    """
+    """Newton's iterates from `at` while the linear systems can be solved; steps may be `damped`."""
     recent: list[float] = []
     while True:
         check_time()

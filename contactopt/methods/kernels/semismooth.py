@@ -132,9 +132,7 @@ class Factored:
     def __call__(
         self, equations: Equations, at: Evaluated, rtol: float = 0.0, ridge: float = RIDGE
     ) -> Iterate | None:
-        """As `Solve`. Open contacts, D = 0, are known at once and leave the system. Where D = I, in
-        stick or in contact without friction, its rows are those of rho Q.
-        """
+        """As `Solve`; open contacts leave the system, and rows with D = I are those of rho Q."""
         (k, d), V, dr = at.error.shape, equations.V, at.error.ravel().copy()
         kept = np.repeat(at.D.reshape(k, d * d).any(axis=1), d)
         p = len(at.balance)
@@ -165,9 +163,7 @@ def crossover(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> Iterate:
-    """Improve an approximate answer r (k, d) of a dimensionless subproblem by Newton steps, and
-    return the best point on the way. c are the displacements without forces; rho is 1 in Equations.
-    """
+    """The best point of Newton steps from an answer r (k, d); c is u at r = 0, and rho is 1."""
     equations = Equations(Q, c.reshape(r.shape), V, s, project)
     residual, r, multipliers = _improve(equations, r, multipliers, steps)
     if steps == STEPS and residual > EXACT * max(1.0, float(np.linalg.norm(r))):

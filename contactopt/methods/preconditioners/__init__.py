@@ -114,9 +114,7 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q in a block for each pair of surfaces, by its mean
-    diagonal; InputError for an unknown name, and for contacts that do not fit.
-    """
+    """The named approximate inverse of Q, in a block for each pair; InputError if none fits."""
     find_preconditioner(name)
     if len(problem.pairs) > 1:
         return _blocks(
@@ -164,9 +162,7 @@ def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
 
 
 def degrees(problem: InterfaceProblem) -> list[int]:
-    """The degree of the smooth motions of each pair: the distance between two pairs is the median
-    over the contacts of one, so that pairs that meet at a corner are not taken for neighbours.
-    """
+    """The degree of each pair's smooth motions; distances are medians, since pairs may meet."""
     from scipy.spatial import KDTree  # late, since it takes long to import
 
     points = [problem.coordinates[:, pair.contacts].T for pair in problem.pairs]
@@ -181,9 +177,7 @@ def degrees(problem: InterfaceProblem) -> list[int]:
 
 
 def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
-    """(k dim, j): Chebyshev polynomials of the place, or cosines and sines on a closed line, in
-    every component; zero where it cannot move, and without what is then no motion of its own.
-    """
+    """(k dim, j): Chebyshev polynomials, or cosines and sines on a closed line, by component."""
     chart = problem.chart
     if chart.period is not None:
         angle = 2 * np.pi * np.outer(np.arange(degree + 1), chart.places[0]) / chart.period
@@ -237,9 +231,7 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, j) with Z'QZ = I on the same columns, and QZ, without columns that depend on others or
-    move nothing, as constant ones on a periodic half-space.
-    """
+    """Z (n, j) on the same columns with Z'QZ = I, and QZ, without columns that move nothing."""
     energy = np.einsum("ij,ij->j", Z, QZ)
     each = energy / np.maximum(np.einsum("ij,ij->j", Z, Z), 1e-300)
     acts = each > DEPENDENT * each.max(initial=0.0)

@@ -84,9 +84,7 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
 
 
 def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
-    """Square root of the weighted Laplacian of the contacts, and its inverse; half the least other
-    eigenvalue of the root stands in the place of zero, for constants.
-    """
+    """Square root of the weighted Laplacian, and its inverse; constants have half its least."""
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)
 

@@ -42,9 +42,7 @@ class Coulomb(Law):
         return coulomb_cone_derivative(y, self.mu)
 
     def project(self, y: np.ndarray) -> Projected:
-        """max(y_n, 0), and y_t projected on the disc of radius mu max(y_n, 0) (Alart, Curnier). It
-        is no projection on a convex set, but r = P(r - rho u) exactly at the solutions.
-        """
+        """max(y_n, 0), and y_t projected on the disc of radius mu max(y_n, 0) (Alart, Curnier)."""
         n, t = split(y)
         closed = n > 0
         P, D = disc_of_height(np.maximum(n, 0.0), t, self.mu, closed.astype(float))

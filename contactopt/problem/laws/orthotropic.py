@@ -125,7 +125,7 @@ class Orthotropic(Law):
         return P, D
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
-        """By a number that is added to both coefficients."""
+        """The derivative with respect to a number that is added to both coefficients."""
         radii, _ = self._axes(y.shape[1])
         size = np.where(radii > 0, radii, 1.0)
         cosine, sine = np.cos(self.angle), np.sin(self.angle)
