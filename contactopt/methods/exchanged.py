@@ -231,7 +231,7 @@ def _within(
 def _allowed(
     problem: InterfaceProblem, solution: Solution, contacts: np.ndarray, ways: np.ndarray
 ) -> np.ndarray:
-    """Combinations of changes (k, dim, j) of forces that stay on the ray of each contact that slips,
+    """Combinations of changes (k, dim, j) that keep the force of each sliding contact on its ray,
     and are zero at open ones.
     """
     u = problem.displacements(solution.reactions, solution.multipliers)
