@@ -27,7 +27,16 @@ from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.transfer import transfer
-from contactopt.readings.constants import BALANCED, BEARABLE, BORNE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
+from contactopt.readings.constants import (
+    BALANCED,
+    BEARABLE,
+    BORNE,
+    COARSEST,
+    FACTOR,
+    ROUGH,
+    ROUNDS,
+    SLOW,
+)
 from contactopt.readings.validity import validity
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
