@@ -1,7 +1,5 @@
 """Short texts about results: one line for a terminal, a small table for a notebook."""
 
-from __future__ import annotations
-
 import html
 from collections.abc import Mapping, Sequence
 

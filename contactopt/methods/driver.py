@@ -1,7 +1,5 @@
 """The driver of every method: clock, stopping rule, history, limits, certificate."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping

@@ -6,8 +6,6 @@ forces that solve the problem, those with the least friction are given: a corner
 pressure has this pressure, and no friction.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 
@@ -30,7 +28,6 @@ FEW = 600
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
 SEEN = 1e-6  # size of the friction of an exchange of size one that has some
-EVEN = 1e-3  # relative difference of pressures that are alike
 EMPTY = np.zeros(0, dtype=int)
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 # by forces that are hardly felt, and the certificate up to which others may take their place
@@ -173,7 +170,7 @@ def _with_least(
         return chosen, EMPTY
     normal, sizes = own[~tangents] // problem.dim, np.linalg.norm(alone, axis=1)
     pressures = (chosen[:, 0] / problem.areas)[normal[sizes > SEEN * sizes.max()]]
-    uneven = np.ptp(pressures) > EVEN * np.abs(pressures).max()
+    uneven = np.ptp(pressures) > 1e-3 * np.abs(pressures).max()  # others are alike
     return chosen, normal[[np.argmax(sizes)]] if uneven else EMPTY
 
 

@@ -21,8 +21,6 @@ ROWS has one row for each. What it makes, a Quantity, is all that is known of it
 errors, gradients, fits and the command line know of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -4,8 +4,6 @@ Whatever solves scenes is a loop around the two functions of this module: the co
 paths (contactopt.solving), and refinement (contactopt.accuracy).
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections import Counter
