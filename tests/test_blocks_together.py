@@ -130,6 +130,12 @@ CASES = {
         stiff(blocks(((0, 0), (1, 1), (2, 2), "quad"), ((1, 0), (2, 1), (3, 3), "tri"), degree=2)),
         turn_about((0, 0, 1), 0.5)[:2, :2],
     ),
+    "a thin body between two others sees all of their contacts": blocks(
+        ((0, 1 / 3, 0), (1, 1, 1 / 3), (2, 2, 1), "quad"),
+        ((0, 0, 0), (1, 2 / 9, 1 / 3), (1, 2, 2), "tri"),
+        ((0, 2 / 9, 0), (1, 1 / 3, 1 / 3), (1, 2, 2), "quad"),
+        degree=2,
+    ),
     "ties of one element": blocks(
         ((0, 0), (2, 0.4), (6, 1), "quad"),
         ((0, 0.4), (0.5, 0.9), (1, 1), "quad"),
