@@ -33,22 +33,22 @@ from contactopt.solving.solve_scene import Options, Solved, solve_scene
 # and 1
 SHARE = 0.6
 LESS = 0.25  # by how much the change of a path falls at most from one mesh to the next
-# share of its error that a refinement leaves at corners: what is marked makes SHARE, and is halved
-SLOW = 1 - SHARE / 2
+SLOWEST = 0.9  # ratio of the errors of two meshes; above, a refinement tells nothing of the next
 USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given
 
 
-def remaining(changes: np.ndarray) -> float:
+def remaining(changes: np.ndarray, ratio: float) -> float:
     """The error of a load path after the last one or two `changes` of its value, in their order.
 
-    It falls by the observed ratio in every refinement, at most by LESS and at least by SLOW, which
-    is taken where there is one change. Changes of both signs scatter: then the larger one counts.
+    The error of a quantity falls as the square of that in the energy norm, whose `ratio` of the
+    last two meshes this is, held below SLOWEST: what remains is a geometric series. The change
+    itself falls at most by LESS. Changes of both signs scatter: then the larger one counts.
     """
     last, before = abs(changes[-1]), abs(changes[-2]) if len(changes) > 1 else 0.0
-    ratio = min(last / before, SLOW) if before > 0 else SLOW
     scatters = len(changes) > 1 and changes[0] * changes[1] < 0
     least = SAFETY[3] * max(last, before * (1.0 if scatters else LESS))
-    return float(max(least, last * ratio / (1 - ratio)))
+    held = min(ratio, SLOWEST)
+    return float(max(least, last * held / (1 - held)))
 
 
 class Locally:
@@ -108,7 +108,9 @@ class Locally:
         if not len(changes):
             size = np.inf
         elif solved.path is not None:  # nothing but the changes tells the error of a whole path
-            size = remaining(np.diff(self.values[-3:]))
+            before = self.errors[-2].energy
+            ratio = (last.energy / before) ** 2 if before > 0 else SLOWEST
+            size = remaining(np.diff(self.values[-3:]), ratio)
         else:  # no adjoint: what a refinement changed, twice
             size = 2 * float(np.max(changes))
         mesh = np.nan if solved.path is not None else -last.total
