@@ -57,9 +57,7 @@ def check_number(
 
 
 def check_size(name: str, value: float, low: float = -LARGEST) -> None:
-    """Raise InputError unless a value with a unit is a number in (low, LARGEST), and 0 or at least
-    SMALLEST.
-    """
+    """Raise InputError unless a value with a unit is in (low, LARGEST) and 0 or not tiny."""
     check_number(name, value, low, LARGEST)
     if 0 < abs(value) < SMALLEST:
         zero = "write 0, or " if low < 0 else ""
@@ -70,9 +68,7 @@ def check_size(name: str, value: float, low: float = -LARGEST) -> None:
 
 
 def check_memory(what: str, needed: float) -> None:
-    """Raise InputError if `what` needs more memory [bytes] than is free, as far as the system
-    tells, before any is taken for it.
-    """
+    """Raise InputError if `what` needs more memory [bytes] than is free."""
     free = _free_memory()
     if needed > free:
         raise InputError(
@@ -174,17 +170,15 @@ def place_words(x: Iterable[float]) -> str:
 
 
 def short(value: object, most: int = 60) -> str:
-    """Write a value as Python does. Of a text of more than `most` characters, three quarters of
-    these stay, with three dots in the middle.
+    """Write a value as Python does. A text of more than `most` characters is cut to three
+    quarters of them, with three dots in the middle.
     """
     text = repr(value)
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
 
 
 def meant(name: str, known: Iterable[str]) -> str:
-    """The end of a sentence about an unknown name: '; did you mean ...?' where one of the known
-    names is nearly the same, or a full stop.
-    """
+    """The end of a sentence on an unknown name: '; did you mean ...?' or a full stop."""
     near = get_close_matches(name, known, 1)
     return f"; did you mean {near[0]!r}?" if near else "."
 
@@ -211,9 +205,7 @@ def said_once() -> Iterator[None]:
 
 @contextmanager
 def overheard() -> Iterator[list[str]]:
-    """Collect what the package warns of within the block, each sentence once, in a list that grows
-    as it runs. Who listens already goes on hearing it.
-    """
+    """Collect what the package warns of within the block, each sentence once, in a list."""
     told: list[str] = []
 
     def hear(record: logging.LogRecord) -> None:

@@ -123,9 +123,7 @@ def pair_rows(summary: dict[str, Any]) -> list[tuple[str, ...]]:
 
 
 def summary_rows(summary: dict[str, Any]) -> dict[str, str]:
-    """The numbers of a run beside those of its pairs in words and with units: first what was
-    found, then how far it can be trusted. A terminal, a page and a notebook show them.
-    """
+    """The numbers of a run in words and with units: what was found, then how far to trust it."""
     length, stress = summary["units"]
     rows = {}
     if len(summary["pairs"]) == 1:

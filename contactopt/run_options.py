@@ -116,9 +116,7 @@ IN_FILES = tuple(name for name in OPTIONS if name in _TEXTS["in_scene_files"])
 def choose(
     keywords: Mapping[str, Any], in_file: Mapping[str, Any]
 ) -> tuple[RunOptions, dict[str, Any]]:
-    """Divide the keywords of contactopt.run into the options of a run, and all others. An option
-    that is None was not given; then that of the scene file counts.
-    """
+    """Divide the keywords of contactopt.run into options of a run that are given, and others."""
     given = {name: value for name in OPTIONS if (value := keywords.get(name)) is not None}
     others = {name: value for name, value in keywords.items() if name not in OPTIONS}
     return RunOptions(**{**in_file, **given}), others
@@ -137,9 +135,7 @@ def explained(only: str = "") -> str:
 
 
 def takes_options(function: F) -> F:
-    """Write the options into the signature of a function that takes them as keywords, and into its
-    docstring, instead of the line OPTIONS.
-    """
+    """Write the options into the signature and the docstring (line OPTIONS) of a function."""
     signature = inspect.signature(function, eval_str=False)
     *own, keywords = signature.parameters.values()
     options = [

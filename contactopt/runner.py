@@ -175,9 +175,7 @@ def _run(
 
 
 def scene_of(scene: str | Path | Scene, **changes: Any) -> Scene:
-    """The scene that a name or a scene file stands for, with changes as for run(); of a load path
-    its last state.
-    """
+    """The scene of a name or file, with changes as for run(); of a load path its last state."""
     return states_of(scene, **changes)[0][-1]
 
 
@@ -191,9 +189,7 @@ def states_of(
 
 @said_once()
 def _scene_file(scene: str | Path | Scene, changes: dict[str, Any]) -> SceneFile | None:
-    """The scene file that the name of a scene stands for, with changes of its entries; None for all
-    other scenes.
-    """
+    """The scene file that a scene's name stands for, with changed entries; else None."""
     if isinstance(scene, Scene) or not str(scene).endswith(".toml"):
         return None
     from contactopt.scenes.scene_files import read_scene_file
@@ -288,9 +284,7 @@ def _result(
     names: tuple[str, str, str],
     told: tuple[str, ...] = (),
 ) -> Result:
-    """The result with the fields of the bodies; `names` are of the method and its backends, and
-    `told` are remarks made before.
-    """
+    """The result with the fields of the bodies; `told` are remarks made before."""
     reduction, ended, path = solved.reduction, solved.solution, solved.path
     solution = path.states[-1].solution if path else ended
     seconds = dict(ended.seconds)

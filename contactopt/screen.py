@@ -1,7 +1,5 @@
 """What a terminal shows: the answer of a run in tables, and a bar while something long goes on."""
 
-from __future__ import annotations
-
 import re
 import sys
 import threading
@@ -17,9 +15,7 @@ STEPS = re.compile(r"(?:state|mesh) (\d+)(?: of (\d+))?\b")  # sentences about w
 
 
 def in_tables(title: str, table: Sequence[Sequence[str]], rows: Mapping[str, str]) -> str:
-    """The text of a table of numbers, whose first row is a head, and of rows of words below it:
-    with colours and as wide as the terminal where the output is one, else plain.
-    """
+    """A table of numbers with a head, and rows of words below it; coloured on a terminal."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

@@ -80,7 +80,7 @@ def write(
 
 def save_figures(name: str, figures: dict[str, Any]) -> None:
     """Write the figures of a report alone: what `python -m experiments.questions.NAME figures` does
-    to draw them anew from the tables, as PDF, too.
+    to draw them again from the tables, as PDF, too.
     """
     for stem, figure in figures.items():
         for ending in ("png", "pdf") if figures_alone() else ("png",):
@@ -88,7 +88,7 @@ def save_figures(name: str, figures: dict[str, Any]) -> None:
 
 
 def figures_alone() -> bool:
-    """Whether the command asks to draw the figures anew and to measure nothing."""
+    """Whether the command asks to draw the figures again and to measure nothing."""
     return sys.argv[1:] == ["figures"]
 
 

@@ -116,13 +116,23 @@ def cube() -> InterfaceProblem:
 @pytest.fixture(scope="session")
 def campaign(tmp_path_factory) -> Path:
     """The folder of a small campaign, with its report."""
+    import fcntl
+
     from contactopt.cli import main
     from tests.test_benchmark import SMALL, written
 
-    folder = tmp_path_factory.mktemp("campaign")
-    path, out = written(folder, SMALL), folder / "out"
-    assert main(["bench", str(path), "--out", str(out), "--jobs", "2", "-q"]) == 0
-    return out
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent  # that of all workers, of which the first one runs the campaign
+    folder, done = shared / "campaign", shared / "campaign" / "done"
+    folder.mkdir(exist_ok=True)
+    with (shared / "campaign.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not done.exists():
+            command = ["bench", str(written(folder, SMALL)), "--out", str(folder / "out")]
+            assert main([*command, "--jobs", "2", "-q"]) == 0
+            done.touch()
+    return folder / "out"
 
 
 @pytest.fixture

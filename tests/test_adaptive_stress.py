@@ -217,7 +217,7 @@ max_memory = 3
     [
         ("press-fit", "von_mises:hub"),
         ("cylinder-2d", "pressure"),
-        ("pin-in-bush", "von_mises:bush"),
+        pytest.param("pin-in-bush", "von_mises:bush", marks=pytest.mark.slow),
     ],
 )
 def test_one_mesh_reads_a_quantity_with_its_error(scene, quantity):

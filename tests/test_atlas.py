@@ -47,7 +47,7 @@ def test_every_method_of_ours_is_in_the_atlas():
 
 @pytest.mark.parametrize("name", ONE_BY_ONE)
 def test_the_method_still_fails_on_its_smallest_problem_and_the_proof_holds(name):
-    """If this fails because the method solves it now: search anew, and change the page."""
+    """If this fails because the method solves it now: search again, and change the page."""
     case, words = Case.of(OURS[name]["case"]), WORDS[name]
     end = run(name, case)
     assert end.failed and end.what == OURS[name]["what"], f"{name} solves its problem now: {end}"

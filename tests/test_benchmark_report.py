@@ -309,10 +309,14 @@ def test_a_figure_without_rows_is_left_out_with_a_sentence(reported, monkeypatch
     assert text.count("*Figure ") == 1 and text.count("*Table ") == 1
 
 
-FOUND = [path for path in sorted(CAMPAIGNS.glob("*.toml")) if read_layout(path).findings]
+FOUND = [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem == "small_tier"))
+    for path in sorted(CAMPAIGNS.glob("*.toml"))
+    if read_layout(path).findings
+]
 
 
-@pytest.mark.parametrize("path", FOUND, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", FOUND)
 def test_findings_say_what_the_table_lacks(path):
     """Where runs are filtered out, as by `bench --filter`, or no method of a kind is there."""
     layout = read_layout(path)

@@ -261,12 +261,20 @@ def test_bounds_in_space_are_the_same_turned_and_in_other_units(degree):
         assert np.isclose(*found, rtol=1e-7)
 
 
-@pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize("make", [on_floor, ring_on_floor])
-@pytest.mark.parametrize("law", LAWS)
-def test_the_interval_of_a_quantity_holds_the_fine_value(law, make, degree):
+@pytest.mark.parametrize(
+    ("law", "make", "degree", "plate"),
+    [
+        ("frictionless", on_floor, 1, True),
+        ("frictionless", ring_on_floor, 2, False),
+        ("tresca", on_floor, 2, False),
+        ("tresca", ring_on_floor, 1, True),
+        ("coulomb", on_floor, 1, False),
+        ("coulomb", ring_on_floor, 2, True),
+        ("coulomb", on_floor, 2, True),
+    ],
+)
+def test_the_interval_of_a_quantity_holds_the_fine_value(law, make, degree, plate):
     """With a plate or a given displacement, of which each law, body and degree has one."""
-    plate = (list(LAWS).index(law) + (make is on_floor) + degree) % 2 == 0
     names = ("approach" if plate else "normal_force", "energy")
     hold_the_fine_value(make(degree, plate=plate, law=law, mu=LAWS[law]), names)
 
@@ -368,7 +376,7 @@ def test_a_search_says_bound_or_estimate():
     assert found.guarantee.sentence.startswith("bound:") and found.guarantee.bound < 0.1
     _, found = refine([make_scene("punch-2d", mu=0.0)], "approach", 0.05, bound=True)
     assert found.guarantee.bound < 0.1
-    _, found = refine([make_scene("punch-3d")], "approach", 0.05, bound=True)
+    _, found = refine([make_scene("punch-3d")], "approach", 0.3, bound=True)
     assert found.guarantee.sentence.startswith("estimate, no bound: body")
     assert refine([scene], "approach", 0.1)[1].guarantee is None
 

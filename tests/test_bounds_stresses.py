@@ -189,6 +189,7 @@ def test_the_stress_of_a_bilinear_displacement():
     assert np.isclose(whole, flat @ energy @ flat, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_the_constant_of_uneven_tractions_is_proved():
     """By composite stresses from above, and by displacements from below."""
     most = composite(3) / (1 - 0.5**3)

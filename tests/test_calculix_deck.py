@@ -128,6 +128,7 @@ def test_a_body_force_thickness_and_half_a_model_agree(tmp_path):
 
 
 @needs_ccx
+@pytest.mark.slow
 def test_forces_of_a_pin_in_a_bush_approach_ours_as_the_mesh_gets_finer(tmp_path):
     found = []
     for elements in (8, 16):

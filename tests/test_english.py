@@ -71,7 +71,15 @@ CALQUES = (
     r"\bmap leads out\b",
     r"\berror is taken off\b",
     r"\bdecides? nothing alone\b",
-    r"\bmesh \w+(?: place)? anew\b",
+    r"\b(?:made?|built|begins?|start(?:s|ed)|measured?|draw|search|place) anew\b",
+    r"\bof the head(?: of|\.)",
+    r"\bmodule's head\b",
+    r"\bby little\b",
+    r"\bis one of the plane\b",
+    r"\bthe head of (?:this module|contactopt)",
+    r"\bover (?:itself|themselves)\b",
+    r"\barguments as of\b",
+    r'(?-i:(?:"""|[a-z)]\. )Of (?!course)[a-z])',
 )
 FOLDERS = ("contactopt", "experiments")
 KINDS = {".py", ".md", ".toml", ".js", ".html"}

@@ -115,6 +115,7 @@ def loop():
     return [push.put(scene, shear) for shear in (0.0, 40.0, -25.0)]
 
 
+@pytest.mark.slow
 def test_gradients_along_a_load_path_forward_and_adjoint():
     states, h = loop(), 1e-5
     result = follow(states, tol=1e-13)

@@ -79,7 +79,10 @@ def numbers(result: Any) -> np.ndarray:
     return np.array([*found, *([result.estimate.value] if result.estimate else [])])
 
 
-@pytest.mark.parametrize("kind", SMALL)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(k, marks=[pytest.mark.slow] * k.startswith("a path with an acc")) for k in SMALL],
+)
 def test_a_run_goes_on_from_each_of_its_steps(kind, tmp_path, monkeypatch):
     name, options = SMALL[kind]
     options = options | {"figures": ()}

@@ -230,10 +230,18 @@ def test_the_last_step_of_a_path_is_the_load():
         (slope(0.0, 0.0), "block:left", 0.0, "any block:left"),
         (slope(support=(Support("right", {"x": 0.0}),)), "block:left", np.inf, "supports bear"),
         (pressed(), "block:top", np.inf, "below 0 times block:top, and at no larger"),
-        (beneath(0.5), "block:top", np.inf, "below 0.83333 times block:top, and at no larger"),
-        (beneath(0.5), "block:top", np.inf, "At 1, the load as given, friction can"),
-        (beneath(0.65), "block:top", np.inf, "below 1.0833 times block:top, and at no larger"),
-        (beneath(0.65), "block:top", np.inf, "At 1, the load as given, they do"),
+        (
+            beneath(0.5),
+            "block:top",
+            np.inf,
+            "below 0.83333 times block:top, and at no larger ... load as given, friction can",
+        ),
+        (
+            beneath(0.65),
+            "block:top",
+            np.inf,
+            "below 1.0833 times block:top, and at no larger ... load as given, they do",
+        ),
         (slope(0.0, 3.0), "block:left", 4.0, "slide away, tip over or lift off above 4 times"),
         pytest.param(
             *(slope(), "block:body_force", np.inf, "friction grows with the load"),
@@ -251,9 +259,11 @@ def test_the_last_step_of_a_path_is_the_load():
 )
 def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, factor, said):
     found = limit(scene, load)
-    assert found.factor == pytest.approx(factor, rel=1e-4) and said in str(found), found
+    assert found.factor == pytest.approx(factor, rel=1e-4), found
+    assert all(words in str(found) for words in said.split(" ... ")), found
 
 
+@pytest.mark.slow
 def test_a_wedge_that_locks_itself_rests_only_where_its_forces_arise():
     """Forces in the cones balance any pull on it, but it lifts off where the pull exceeds the push
     on its top: below .15 times the push.

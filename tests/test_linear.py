@@ -15,17 +15,11 @@ from scipy.sparse.linalg import spsolve
 
 from contactopt import scenes
 from contactopt.bodies.body import build_body
-from contactopt.bodies.solvers import SOLVERS, choose, make_solver, multigrid, solver_type
-from contactopt.bodies.solvers import sparse_products as products
-from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM, RTOL
-from contactopt.bodies.solvers.multigrid import (
-    conjugate_gradients,
-    nodal_blocks,
-)
+from contactopt.bodies.solvers import SOLVERS, choose, make_solver, solver_type
+from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM
 from contactopt.bodies.solvers.ordering import elimination_order
-from contactopt.bodies.solvers.sparse_products import SparseProduct
-from contactopt.bodies.solvers.system import Submatrix, System
-from contactopt.errors import BackendError, InputError
+from contactopt.bodies.solvers.system import System
+from contactopt.errors import InputError
 from contactopt.linear.concurrency import Crew
 
 
@@ -118,70 +112,6 @@ for _ in range(100):
 def test_pardiso_outlives_the_threads_that_call_it():
     pytest.importorskip("pypardiso")
     subprocess.run([sys.executable, "-c", SHORT_THREADS], check=True, timeout=300)
-
-
-def energy(A, x):
-    return np.sqrt(x @ (A @ x))
-
-
-@pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-10])
-def test_multigrid_keeps_its_word_in_the_energy_norm(body, rtol):
-    A, *_, last = args = BODIES[body]
-    b = np.zeros(A.shape[0])
-    b[last] = np.random.default_rng(0).standard_normal(len(last))
-    x = spsolve(A.tocsc(), b)
-    error = energy(A, made("multigrid", args).solve(b, rtol) - x)
-    assert error <= 2 * rtol * energy(A, x)
-
-
-@pytest.mark.parametrize("body", sorted({*BODIES} - {"fine punch"}))
-def test_the_v_cycle_is_symmetric_and_close_to_the_inverse(body):
-    solver, A = made("multigrid", BODIES[body]), BODIES[body].A.toarray()
-    B = np.stack([solver.cycle.apply(e) for e in np.eye(len(A))], axis=1)
-    scale = np.sqrt(np.diag(A))
-    scaled = B * scale * scale[:, None]
-    assert np.abs(scaled - scaled.T).max() <= 1e-5 * np.abs(scaled).max()  # single precision
-    L = np.linalg.cholesky(A)
-    values = np.linalg.eigvalsh(L.T @ (B + B.T) @ L / 2)  # those of B A
-    assert values.min() > 0.2 and values.max() < 1.1
-
-
-@pytest.mark.parametrize(
-    "scene, part, sizes",
-    [
-        (scenes.flat_punch(2), "lower", (16, 32, 64)),
-        (scenes.sphere(), "upper", (8, 16, 32)),
-        (scenes.flat_punch(3), "upper", (4, 8, 16)),
-        (scenes.flat_punch(3), "lower", (4, 8, 16)),
-    ],
-    ids=["plane", "axisymmetric", "solid punch", "solid foundation"],
-)
-def test_iterations_of_multigrid_are_bounded_as_the_mesh_is_refined(scene, part, sizes):
-    counts = []
-    for elements in sizes:
-        A, *_, last = args = system(scene, getattr(scene, part), elements)
-        solver = made("multigrid", args)
-        b = np.zeros(A.shape[0])
-        b[last] = np.random.default_rng(0).standard_normal(len(last))
-        counts.append(conjugate_gradients(solver.A, solver.cycle, b, RTOL).cycles)
-    assert max(counts) <= 25 and counts[2] <= counts[1] + 4, counts
-
-
-def test_iterations_do_not_depend_on_units_and_vanish_without_load():
-    A, *rest = BODIES["solid foundation"]
-    b = np.random.default_rng(0).standard_normal(A.shape[0])
-    answers = []
-    # beyond the range of single precision
-    for force, length in ((1.0, 1.0), (1e9, 1.0), (1e-30, 1e-6)):
-        solver = made("multigrid", System(force / length * A, *rest))
-        x, cycles = conjugate_gradients(solver.A, solver.cycle, force * b, RTOL)
-        answers.append((x / length, cycles))
-        assert not np.any(solver.solve(0 * b))
-        assert solver.solve(np.zeros((len(b), 0))).shape == (len(b), 0)
-    for x, cycles in answers[1:]:
-        assert np.linalg.norm(x - answers[0][0]) <= 1e-7 * np.linalg.norm(answers[0][0])
-        assert cycles == answers[0][1] > 0
 
 
 @pytest.mark.parametrize("name", SOLVERS)
@@ -304,58 +234,12 @@ def test_elimination_orders_fill_less_than_either_textbook_order(dim, held):
     assert fill(A, order) < 0.75 * fill(A, rows)
 
 
-@pytest.mark.parametrize("form", ["csr", "bsr"])
-def test_threads_share_products_without_a_trace(form, monkeypatch):
-    """The product is the same to the last digit, and the pieces of the matrix are no copies."""
-    monkeypatch.setattr(products, "LARGE", 1)
-    A = BODIES["solid foundation"].A
-    n = A.shape[0] // 3 * 3
-    A = A[:n][:, :n] if form == "csr" else A[:n][:, :n].tobsr((3, 3))
-    x = np.random.default_rng(0).standard_normal(n)
-    shared = SparseProduct(A, Crew(3))
-    assert np.array_equal(shared @ x, SparseProduct(A) @ x)
-    assert all(np.shares_memory(A.data, piece.matrix.data) for piece in shared._pieces)
-    P = sp.random_array((n, 40), density=0.1, rng=np.random.default_rng(0)).toarray()
-    coarse = products.galerkin(sp.bsr_matrix(P, blocksize=(3, 5)), A.tobsr((3, 3)), Crew(3))
-    assert np.allclose(coarse.toarray(), P.T @ (A @ P), atol=1e-12 * abs(A).max())
-
-
 def test_a_crew_does_everything_once_and_reports_failures():
     done = []
     Crew(4).each([partial(done.append, i) for i in range(50)])
     assert sorted(done) == list(range(50))
     with pytest.raises(ZeroDivisionError):
         Crew(2).each([lambda: 1 // 0] * 5)
-
-
-def test_a_block_is_the_matrix_without_the_other_rows():
-    """Multigrid for a Submatrix, which copies nothing, is multigrid for the rows and columns
-    themselves.
-    """
-    A, *rest = BODIES["solid punch"]
-    n = A.shape[0]
-    whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))
-    block = System(Submatrix(whole, np.arange(2, n + 2)), *rest)
-    b = np.random.default_rng(0).standard_normal(n)
-    assert np.array_equal(
-        made("multigrid", block).solve(b), made("multigrid", System(A, *rest)).solve(b)
-    )
-
-
-@pytest.mark.parametrize("degree", [1, 2])
-def test_blocks_of_the_stiffness_are_those_of_its_rows(degree):
-    """Of a body with held components at some nodes and others that are held altogether."""
-    scene = scenes.make_scene("punch-3d", degree=degree)
-    body = build_body(scene, scene.lower, 3, scene.zone)
-    dofs, free = body.unknowns, body.free
-    node, component = np.empty((2, dofs.size), dtype=int)
-    node[dofs], component[dofs] = np.arange(dofs.shape[1]), np.arange(len(dofs))[:, None]
-    known = node[free], component[free], len(dofs)
-    fast, place, present = nodal_blocks(Submatrix(body.A, free), *known)
-    slow, *others = nodal_blocks(body.A[free][:, free], *known)
-    assert len(present) < dofs.shape[1] and len(place) < fast.shape[0]
-    assert fast.blocksize == (3, 3) and abs(fast - slow).max() == 0
-    assert np.array_equal(place, others[0]) and np.array_equal(present, others[1])
 
 
 def test_names_that_do_not_exist():
@@ -371,18 +255,6 @@ def test_a_missing_package_is_named(monkeypatch, name, package):
         monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(InputError, match=f"pip install {package}"):
         make_solver(name, BODIES["solid foundation"])
-
-
-def test_accuracy_that_cannot_be_had(monkeypatch):
-    solver = made("multigrid", BODIES["solid foundation"])
-    b = np.ones(solver.n)
-    with pytest.raises(InputError, match="rtol"):
-        solver.solve(b, 0.0)
-    with pytest.raises(BackendError, match="multigrid"):
-        solver.solve(b * np.nan)
-    monkeypatch.setattr(multigrid, "MOST_ITERATIONS", 3)
-    with pytest.raises(BackendError, match="within 3 iterations"):
-        solver.solve(b)
 
 
 def resident():

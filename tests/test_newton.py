@@ -1,11 +1,11 @@
 """The default and what it is made of: Newton's method, the proximal loop, warm starts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.linalg as la
 from conftest import one_contact
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from contactopt import (
     InputError,
@@ -44,12 +44,13 @@ def test_bonded_system_refuses_what_it_cannot_factorise():
             Bonded(Q, np.zeros((2, 0)))
 
 
-@pytest.mark.parametrize("mu", [0, 0.05, 0.2, 0.5, 1, 2, 5, 10])
 @pytest.mark.parametrize("name", SMALL)
-def test_the_scenes_are_certified_at_every_friction_coefficient(name, mu):
-    solution = solve(reduce(make_scene(name, mu=mu, elements=SMALL[name])), tol=1e-10)
-    assert solution.solved and solution.iterations <= 13
-    assert np.all(solution.reactions[:, 0] >= 0)
+def test_the_scenes_are_certified_at_every_friction_coefficient(name):
+    problem = reduce(make_scene(name, elements=SMALL[name]))
+    for mu in (0.0, 0.05, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0):
+        solution = solve(replace(problem, law=mu), tol=1e-10)
+        assert solution.solved and solution.iterations <= 13, mu
+        assert np.all(solution.reactions[:, 0] >= 0)
 
 
 def test_small_problems_on_which_fixed_points_fail():
@@ -148,48 +149,3 @@ def test_transfer_keeps_the_traction():
 def test_start_of_the_wrong_size_is_refused(punch, cube):
     with pytest.raises(InputError, match="start has reactions"):
         solve(punch, start=solve(cube))
-
-
-@settings(max_examples=25, deadline=None)
-@given(
-    st.integers(0, 10**6),
-    st.sampled_from([2, 3]),
-    st.floats(-9, 9),
-    st.floats(-9, 9),
-    st.floats(0.0, 0.3),
-)
-def test_invariance(seed, dim, force, length, mu):
-    """Units, order of the contacts, tangential basis, mirror image: the same solution, where it is
-    unique.
-    """
-    rng = np.random.default_rng(seed)
-    k = 5
-    A = rng.normal(size=(k * dim, k * dim))
-    base = InterfaceProblem(
-        A @ A.T / (k * dim) + np.eye(k * dim), rng.normal(size=(k, dim)) - 0.5, mu
-    )
-    order = rng.permutation(k)
-    turn = np.zeros((k, dim, dim))
-    turn[:, 0, 0] = 1.0
-    # rotations and mirrors
-    turn[:, 1:, 1:] = [la.qr(rng.normal(size=(dim - 1, dim - 1)))[0] for _ in range(k)]
-    T = la.block_diag(*turn)[(order[:, None] * dim + np.arange(dim)).ravel()]
-    f, g = 10**force, 10**length
-    q = (T @ base.q.ravel()).reshape(k, dim)
-    other = InterfaceProblem(T @ base.Q @ T.T * g / f, q * g, mu)
-    a, b = solve(base, tol=1e-11), solve(other, tol=1e-11)
-    assert a.solved and b.solved
-    assert np.allclose(
-        T @ a.reactions.ravel(),
-        b.reactions.ravel() / f,
-        atol=1e-8 * (1 + np.abs(a.reactions).max()),
-    )
-
-
-@given(st.floats(1e-6, 1e6))
-@settings(max_examples=10, deadline=None)
-def test_load_scales_the_answer_where_there_is_no_gap(factor):
-    base = reduce(scenes.flat_punch(2, elements=5))
-    loaded = InterfaceProblem(base.Q, base.q, base.mu, base.V, base.s * factor)
-    a, b = solve(base, tol=1e-11), solve(loaded, tol=1e-11)
-    assert np.allclose(b.reactions / factor, a.reactions, atol=1e-8)

@@ -1,11 +1,14 @@
 """Solvers of others in another Python: found or absent, timed there, judged here."""
 
+import pickle
 import sys
 
 import numpy as np
 import pytest
 
-from contactopt import InputError, InterfaceProblem, benchmark, natural_map_residual, solve
+import contactopt
+from contactopt import InputError, InterfaceProblem, benchmark, natural_map_residual
+from contactopt.benchmark import peers
 from contactopt.benchmark.peers import Peer
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.problem.laws.coulomb import Coulomb
@@ -95,6 +98,7 @@ def test_a_peer_is_timed_where_it_runs_and_its_failures_cost_a_row_each(tmp_path
         """,
     )
     along, table = table[table["states"] == 5], table[table["states"] == 1]
+    assert (along["repeat"] == 0).all() and (table["repeat"] == 1).any()
     bridged = along[along["method"] == "toy(trouble='')"]
     assert bridged["success"].all() and (bridged["bridge_seconds"] > 1.2).all()  # which is no limit
     first = table[table["repeat"] == 0].set_index("method")
@@ -114,12 +118,56 @@ def test_a_peer_is_timed_where_it_runs_and_its_failures_cost_a_row_each(tmp_path
     assert len(left) == len(table) + len(along) + 1
 
 
+def version():
+    return "1"
+
+
+def prepare(problem, tol, settings):
+    assert problem["q"].flags.writeable  # arrays of its own in each run
+    if settings["end"]:
+        raise SystemExit
+    return problem
+
+
+def solve(problem):
+    import numpy as np
+
+    return np.maximum(0, -problem["q"]), True, float(problem["start"].sum())
+
+
+def test_a_problem_goes_to_a_peer_once_and_again_to_a_new_process(monkeypatch):
+    monkeypatch.setattr(peers, "MOST_HELD", 2)
+    sent = []
+
+    peer = Peer("Toy", "", [sys.executable], version, prepare, solve)
+    monkeypatch.setattr(
+        peers.pickle, "dump", lambda x, *a, dump=pickle.dump: (sent.append(x[1]), dump(x, *a))
+    )
+    made = [
+        InterfaceProblem(np.eye(2), np.array([[-n, 0.0]]), Coulomb(np.array([0.5])))
+        for n in (1.0, 2.0, 3.0)
+    ]
+    for index, new in [(0, 1), (0, 0), (1, 1), (0, 0), (2, 1), (0, 1)]:
+        begin = np.full((1, 2), 2.0 + index)
+        answer = peer.answer(made[index], 1e-8, 9.0, (2,), begin, end=False)
+        assert (sent.pop() is not None) == new
+        assert answer.reactions.ravel().tolist() == [1.0 + index, 0.0]
+        assert answer.iterations > 0
+    with pytest.raises(RuntimeError, match="ended"):
+        peer.answer(made[0], 1e-8, 9.0, (2,), end=True)
+    assert sent.pop() is None
+    assert peer.answer(made[0], 1e-8, 9.0, (2,), end=False).reactions[0, 0] == 1.0
+    assert sent.pop() is not None
+    peer.process.kill()
+    peer.process.wait()
+
+
 def test_a_plane_problem_reaches_a_peer_in_space_and_without_units():
     seen = {}
 
     def ask(request):
-        with np.load(request[0]) as arrays:
-            seen.update(arrays)
+        for name, (kind, shape, data) in request[1].items():
+            seen[name] = np.frombuffer(data, kind).reshape(shape)
         return {"error": "seen"}
 
     peer = Peer("Toy", "", [], str, str, str)
@@ -164,7 +212,7 @@ def test_solvers_of_others_find_the_certified_answer(module, name, solver):
         assert again.iterations <= answer.iterations
         assert natural_map_residual(problem, again.reactions) <= reached
     plates = FAMILIES["half_plane"](contacts=8)
-    assert len(plates.s) and solve(plates).solved
+    assert len(plates.s) and contactopt.solve(plates).solved
     with pytest.raises(InputError, match="plates"):
         call(plates, 1e-8, 10.0, solver=solver)
 

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -37,6 +38,7 @@ SIZES = (17, 33, 65)  # contacts
 ON_GRIDS = [name for name in PRECONDITIONERS if name != "laplacian"]
 
 
+@cache
 def blocks(k: int, upper: float, lower: float, nu: float) -> InterfaceProblem:
     """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below; k nodes on the
     contact line.
@@ -57,6 +59,7 @@ def blocks(k: int, upper: float, lower: float, nu: float) -> InterfaceProblem:
     )
 
 
+@cache
 def solids(n: int, upper: float, lower: float) -> InterfaceProblem:
     """The same bodies in 3D, with n x n contact nodes."""
     zone = np.linspace(-2, 2, n)

@@ -8,6 +8,7 @@ import json
 import logging
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -23,85 +24,79 @@ SPEAKERS = {"warning", "error", "critical", "exception"}
 OTHERS = {"benchmark", "cli", "fclib", "derivatives", "simplification", "jax"}
 
 
-def calls(tree):
-    return (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+@cache
+def calls():
+    """(room, module, call) of every call in the package."""
+    found = []
+    for file in sorted(PACKAGE.rglob("*.py")):
+        path = file.relative_to(PACKAGE).with_suffix("")
+        module = ".".join(("contactopt", *path.parts))
+        nodes = ast.walk(ast.parse(file.read_text()))
+        found += [(path.parts[0], module, node) for node in nodes if isinstance(node, ast.Call)]
+    return found
 
 
 def speaking():
-    """(module, name of its logger, line) of every call that warns, and (module, line) of every
-    note.
+    """(module, name of its logger) of every module that warns in a run, and every module that makes
+    a note.
     """
-    warned, noted = [], []
-    for file in sorted(PACKAGE.rglob("*.py")):
-        room = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        module = ".".join(("contactopt", *file.relative_to(PACKAGE).with_suffix("").parts))
-        for call in calls(ast.parse(file.read_text())):
-            by = call.func
-            if isinstance(by, ast.Attribute) and by.attr in SPEAKERS and room not in OTHERS:
-                owner = by.value.id if isinstance(by.value, ast.Name) else ""
-                if "log" in owner:
-                    warned.append((module, owner, call.lineno))
-            if isinstance(by, ast.Name) and by.id == "note" and len(call.args) == 2:
-                noted.append((module, call.lineno))
-    return warned, noted
+    warned, noted = set(), set()
+    for room, module, call in calls():
+        by = call.func
+        if isinstance(by, ast.Attribute) and by.attr in SPEAKERS and room not in OTHERS:
+            owner = by.value.id if isinstance(by.value, ast.Name) else ""
+            if "log" in owner:
+                warned.add((module, owner))
+        if isinstance(by, ast.Name) and by.id == "note" and len(call.args) == 2:
+            noted.add(module)
+    return sorted(warned), sorted(noted)
 
 
-WARNED, NOTED = speaking()
-
-
-def seen(tmp_path, capsys, text):
+def seen(tmp_path, capsys, *texts):
     """What the summary, the terminal, the page and a notebook show of a run."""
     out = tmp_path / "out"
     main(["run", "punch-2d", "--elements", "2", "--no-figures", "--html", "--out", str(out)])
-    assert re.search(rf"^note \d+ +{re.escape(text)}$", capsys.readouterr().out, re.M)
-    assert text in json.loads((out / "summary.json").read_text())["remarks"]
-    assert text in (out / "view.html").read_text()
+    printed, page = capsys.readouterr().out, (out / "view.html").read_text()
+    written = json.loads((out / "summary.json").read_text())["remarks"]
     result = contactopt.run("punch-2d", elements=2)
-    assert result.summary["remarks"].count(text) == 1 and text in result._repr_html_()
-
-
-def test_the_code_has_places_that_speak():
-    assert len(WARNED) > 3 and len(NOTED) > 8
+    for text in texts:
+        assert re.search(rf"^note \d+ +{re.escape(text)}$", printed, re.M), text
+        assert text in written and text in page, text
+        assert result.summary["remarks"].count(text) == 1 and text in result._repr_html_(), text
 
 
 def test_nothing_speaks_past_the_log():
     """No room that a run enters warns through Python's warnings, or prints."""
-    for file in sorted(PACKAGE.rglob("*.py")):
-        room = file.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        if room in OTHERS or room in ("__main__", "teaching"):
-            continue
-        for call in calls(ast.parse(file.read_text())):
-            name = ast.unparse(call.func)
-            assert name not in ("print", "warnings.warn"), f"{file}:{call.lineno}"
+    for room, module, call in calls():
+        if room not in OTHERS and room not in ("__main__", "teaching"):
+            assert ast.unparse(call.func) not in ("print", "warnings.warn"), (module, call.lineno)
 
 
-@pytest.mark.parametrize("module, owner", sorted({place[:2] for place in WARNED}))
-def test_a_warning_reaches_the_reader(module, owner, tmp_path, capsys, monkeypatch):
-    """Made by the logger of each module that warns, while the scene is posed."""
-    logger, text = getattr(importlib.import_module(module), owner), f"a remark of {module}"
-    whole = posing.assemble
+def test_warnings_and_notes_of_all_modules_reach_the_reader(tmp_path, capsys, monkeypatch):
+    """Each module that warns does so while the scene is posed, by its own logger; each that makes
+    notes does so while the problem is solved, by the function that it calls.
+    """
+    warned, noted = speaking()
+    assert len(warned) > 3 and len(noted) > 8
+    whole, follow = posing.assemble, driver._follow
 
     def assemble(*arguments):
-        logger.warning("a remark of %s", module)
+        for module, owner in warned:
+            logger = getattr(importlib.import_module(module), owner)
+            logger.warning("a warning of %s", module)
         return whole(*arguments)
 
-    monkeypatch.setattr(posing, "assemble", assemble)
-    seen(tmp_path, capsys, text)
-
-
-@pytest.mark.parametrize("module", sorted({place[0] for place in NOTED}))
-def test_a_note_of_a_method_reaches_the_reader(module, tmp_path, capsys, monkeypatch):
-    """Made by the function that each module calls, while a problem is solved."""
-    found, text = importlib.import_module(module), f"a remark of {module}"
-    assert found.note is notes.note
-    follow = driver._follow
-
     def solving(*arguments):
-        found.note(logging.getLogger(module), text)
+        for module in noted:
+            found = importlib.import_module(module)
+            assert found.note is notes.note
+            found.note(logging.getLogger(module), f"a note of {module}")
         return follow(*arguments)
 
+    monkeypatch.setattr(posing, "assemble", assemble)
     monkeypatch.setattr(driver, "_follow", solving)
-    seen(tmp_path, capsys, text)
+    own = [f"a warning of {module}" for module, _ in warned]
+    seen(tmp_path, capsys, *own, *(f"a note of {module}" for module in noted))
 
 
 def test_notes_of_all_states_of_a_path_are_told_once(monkeypatch):

@@ -80,7 +80,7 @@ def ends(scene, elements=None):
 
 
 @pytest.mark.parametrize("kind", ["plane-strain", "axisymmetric"])
-@pytest.mark.parametrize("mu,nu", [(0.1, 0.3), (0.3, 0.3), (0.7, 0.3), (0.25, 0.0), (0.2, 0.4)])
+@pytest.mark.parametrize("mu,nu", [(0.1, 0.3), (0.7, 0.3), (0.25, 0.0)])
 def test_rigid_punch_sticks_where_spence_says(kind, mu, nu):
     scene = scenes.rigid_punch(kind, mu=mu, lower=Material(3.0, nu))
     ratio, _, r = ends(scene)

@@ -18,7 +18,7 @@ from contactopt.methods import METHODS
 from contactopt.methods.backends import CONIC, QP, child
 from contactopt.methods.backends.qp import BoxQP
 
-LIMIT, SLACK = 0.5, 1.0
+LIMIT, SLACK = 0.1, 1.0
 
 
 def no_solution(dim):

@@ -13,8 +13,6 @@ Source: Williams (1952), Stress singularities resulting from various boundary co
 corners of plates in extension.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -36,9 +34,7 @@ AT_EDGE = 2  # at a corner of the contact surface
 
 
 def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
-    """One sentence that says why no mesh bounds the quantity, of all meshes so far and its reading
-    on the last of them, or an empty text.
-    """
+    """One sentence that says why no mesh bounds the quantity, or an empty text."""
     if not levels[-1].place:
         return ""
     values, pressure = _kept(levels), reading.peaks[0].body < 0
@@ -57,9 +53,7 @@ def unbounded(solved: Solved, reading: Reading, levels: Sequence[Level]) -> str:
 
 
 def _singular(solved: Solved, peak: Peak) -> bool:
-    """Whether a peak of the stress lies at a re-entrant corner of its body, or one of the pressure
-    at the edge of the contact surface of its pair.
-    """
+    """Whether a peak is at a re-entrant corner (stress) or at the edge of a surface (pressure)."""
     if peak.body < 0:
         pairs, first = solved.reduction.problem.pairs, peak.contacts[0]
         number = next(i for i, pair in enumerate(pairs) if pair.start <= first < pair.stop)
@@ -80,9 +74,7 @@ def _kept(levels: Sequence[Level]) -> list[float]:
 
 
 def grows(values: Sequence[float], count: int) -> bool:
-    """Whether the last values of _kept(), or every second one of them, grow steadily as the
-    elements there become smaller. Elements on the two sides of a place may be halved in turn.
-    """
+    """Whether the last values, or every second one, grow steadily as the elements there shrink."""
     for step in (1, 2):
         growths = -np.diff(values[::step][: count + 1])
         if len(growths) == count and np.all(growths > 0):

@@ -1,4 +1,4 @@
-"""Meshes refined everywhere, made anew for more elements: the error is read from differences of
+"""Meshes refined everywhere, made again with more elements: the error is read from differences of
 nested solutions.
 
 Two numbers describe a mesh: `elements` across the contact half-width, which the scene's mesh
@@ -10,7 +10,7 @@ holds fixed. The error is taken as one part that falls with each,
     J(elements, splits) - J = A elements^-p + B 2^(-p' splits),
 
 both read from differences of nested solutions (Richardson): the first of the meshes for n, 2 n, 4 n
-elements, the second of the last of them and its split, measured anew on the mesh that it asks to
+elements, the second of the last of them and its split, measured again on the mesh that it asks to
 split. Their sizes are added, and the larger part is refined next. The claim is their sum times a
 factor of safety, 1.25 from three meshes on and 3 of two. Orders are observed where there are three
 solutions, and held between 3/4 and the order of functionals of smooth solutions, 2 per degree of
@@ -27,8 +27,6 @@ and Validation in Computational Science and Engineering, chapter 5; Eca, Hoekstr
 procedure for the estimation of the numerical uncertainty of CFD calculations based on grid
 refinement studies, for the four meshes.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
@@ -87,9 +85,7 @@ def remainder(before: float | None, last: float, best: float) -> tuple[float, fl
 
 
 def mesh_error(values: Sequence[float], best: float) -> tuple[float, float | None]:
-    """Signed error of the last value of nested meshes, infinite for a single one, and the observed
-    order.
-    """
+    """Signed error of the last of nested meshes, infinite for a single one; observed order."""
     steps = np.diff(values[-3:])
     if not len(steps):
         return np.inf, None
@@ -191,9 +187,7 @@ class Everywhere:
     def advance(
         self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
     ) -> float:
-        """Choose the next mesh; returns how many unknowns it will have. Around `contacts` the mesh
-        is too coarse to know, and `rivals` are local maxima that may be the largest.
-        """
+        """Choose the next mesh; returns how many unknowns it will have."""
         if not self.jobs:
             n, s = max(elements for elements, _ in self.values), self.splits + 1
             fine = abs(judged.grading) > max(abs(judged.mesh), reading.uncertainty)
@@ -205,9 +199,7 @@ class Everywhere:
         return self._unknowns(*self.jobs[0])
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
-        """By how much the quantity changes in the other shape of guessed boundaries, of which there
-        are none here, and a sentence on them.
-        """
+        """Nothing changes: there are no guessed boundaries here."""
         return 0.0, ""
 
     def _unknowns(self, elements: int, splits: int) -> float:

@@ -5,8 +5,6 @@ any estimate of an error means anything. Hertz's theory tells where the contact 
 (contactopt.readings.hertz_size), and elements there are divided before anything is solved.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -26,9 +24,7 @@ GROWTH = 1.0  # by how much elements grow with the distance from the contact
 
 
 def unseen(scene: Scene) -> dict[str, list[Hertz]]:
-    """By the name of each body the contacts whose half-width is predicted to be smaller than an
-    element there; empty where there is none.
-    """
+    """By body the contacts whose predicted half-width is smaller than an element there."""
     found: dict[str, list[Hertz]] = {}
     try:
         with overheard():  # what it remarks is said of the first mesh that is solved
@@ -47,9 +43,7 @@ def unseen(scene: Scene) -> dict[str, list[Hertz]]:
 def seeing(
     scene: Scene, contacts: Mapping[str, list[Hertz]], across: float, shapes: Shapes
 ) -> Scene:
-    """The scene with elements divided so that there are `across` of them along the smallest
-    half-width of each of the contacts of `unseen`.
-    """
+    """The scene with `across` elements along the smallest half-width of contacts of `unseen`."""
 
     def divided(part: Any) -> Any:
         if part.name not in contacts or not hasattr(part, "mesh"):

@@ -56,15 +56,11 @@ class ElementErrors:
 
     @property
     def size(self) -> float:
-        """The estimated size of the error: of the stress in the elements and of the pressure
-        between contacts together.
-        """
+        """The estimated error of stress in the elements and of pressure at contacts together."""
         return abs(self.total - self.between) + abs(self.between)
 
     def marked(self, share: float) -> tuple[np.ndarray, ...]:
-        """For each body the fewest elements that together make this share of the sum of absolute
-        errors (Doerfler).
-        """
+        """For each body the fewest elements with this share of all absolute errors (Doerfler)."""
         sizes = np.abs(np.concatenate(self.bodies))
         order = np.argsort(-sizes, kind="stable")
         count = int(np.searchsorted(np.cumsum(sizes[order]), share * sizes.sum())) + 1

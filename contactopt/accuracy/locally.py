@@ -2,8 +2,6 @@
 everywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -147,9 +145,7 @@ class Locally:
         return float(unknowns(self.states[-1]))
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:
-        """By how much the quantity, `value` on the last mesh with the states `before`, changes in
-        the other shape of guessed boundaries, and one sentence on them.
-        """
+        """How much the `value` changes in the other shape of guessed boundaries; one sentence."""
         if not self.shapes.names:
             return 0.0, ""
         sentence = (

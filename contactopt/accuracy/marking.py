@@ -1,7 +1,5 @@
 """Which elements are divided, and the meshes that come of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,9 +21,6 @@ from contactopt.scenes.body_kinds import Body
 from contactopt.scenes.refined_scenes import part_curves
 from contactopt.scenes.scene import Part, Scene
 
-FIRST = 4  # elements across the contact half-width of a first mesh that the scene itself makes
-RATIO = 1.6  # by how much longer facets may be than those of the other body that face them
-ROUNDS = 6  # of divisions that keep facing facets about as long as each other
 SAMPLES = {2: 32, 3: 8}  # parts of a facet's edge at whose ends a gap function is sampled
 CLOSURE = 0.05  # share of the closure by which a sampled gap may fall below the one between nodes
 
@@ -69,7 +64,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
     def prepared(part: Body) -> Body:
         if not isinstance(part, Part):
             return part
-        given = part.build_mesh(FIRST, scene.zone)
+        given = part.build_mesh(4, scene.zone)  # elements across its first half-width
         cut = simplices(given) if simplicial else straight(given)
         found = curves[part.name] = part_curves(part, given)
         guessed[part.name] = {
@@ -91,9 +86,7 @@ def with_bent_edges(scene: Scene, shapes: Shapes) -> Scene:
 
 
 def left_out(part: Any, shapes: Shapes) -> np.ndarray:
-    """The volumes (elements,) between the straight facets of a body and its curves; (0,) for a body
-    without a mesh, and zeros where edges follow the curves.
-    """
+    """The volumes (elements,) between straight facets and curves; (0,) without a mesh."""
     if not hasattr(part, "mesh"):
         return np.zeros(0)
     straight_edges = not is_curved(part.mesh)
@@ -101,9 +94,7 @@ def left_out(part: Any, shapes: Shapes) -> np.ndarray:
 
 
 def otherwise(scene: Scene, shapes: Shapes) -> Scene:
-    """The scene with every guessed boundary in its other shape (contactopt.accuracy.polygon, and in
-    space contactopt.meshes.facet_surfaces), as it is solved.
-    """
+    """The scene with every guessed boundary in its other shape, as it is solved."""
 
     def moved(part: Any) -> Any:
         points, curves = part.mesh.p.copy(), dict[str, Any](shapes.of(part))
@@ -125,7 +116,7 @@ def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -
     """
     if marked is None:
         return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
-    for _ in range(ROUNDS):
+    for _ in range(6):  # of divisions that keep facing facets about as long as each other
         marked = balanced(scene, marked)
         if not any(len(elements) for elements in marked):
             break
@@ -178,7 +169,7 @@ def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, 
             least = halved[near].copy()
             reached = back <= 2 * size[mine]
             np.minimum.at(least, mine[reached], halved[reached])
-            coarse = (size > RATIO * least) & (distance <= 2 * size)
+            coarse = (size > 1.6 * least) & (distance <= 2 * size)
             chosen[sides[one]].update(element[coarse].tolist())
     return tuple(np.array(sorted(elements), dtype=int) for elements in chosen)
 
@@ -200,9 +191,7 @@ def at_contacts(reduction: Reduction, contacts: np.ndarray) -> tuple[np.ndarray,
 
 
 def spread(reduction: Reduction, weights: np.ndarray) -> list[np.ndarray]:
-    """What the elements (elements,) of each body share of weights (k, dim) of the contacts whose
-    nodes they hold.
-    """
+    """What the elements of each body share of weights (k, dim) of contacts at their nodes."""
     parts = zip(reduction.bodies, reduction.maps)
     return [on_elements(body, np.asarray(abs(B).T @ weights.ravel())) for body, B in parts]
 

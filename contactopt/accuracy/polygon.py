@@ -12,8 +12,6 @@ The quantity is read once more from the other shape, in which every edge has the
 of its two ends. What it changes is the error of the geometry, which no refinement removes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 
@@ -29,17 +27,13 @@ NEAREST = 8  # edges among which that of a point is looked for
 
 
 def other_polygon(mesh: Mesh, facets: np.ndarray) -> Callable[[np.ndarray], np.ndarray] | None:
-    """The other shape of a boundary of a plane mesh, a function of points on the smooth line; None
-    where no edge is in doubt.
-    """
+    """The other shape of a plane boundary, by points on the smooth line; None without doubt."""
     chords = chords_of(mesh, facets)
     return partial(flatter, chords=chords) if np.any(chords[2] > 0) else None
 
 
 def chords_of(mesh: Mesh, facets: np.ndarray) -> Chords:
-    """Begin and end of every straight edge of the facets of a boundary of a plane mesh, and by how
-    far the middle of each is in doubt.
-    """
+    """Begin and end of a plane boundary's straight edges, and the doubt about their middles."""
     edges, points = mesh.facets[:, facets], mesh.p
     count = points.shape[1]
     curvature = np.full(count, np.nan)
@@ -61,9 +55,7 @@ def chords_of(mesh: Mesh, facets: np.ndarray) -> Chords:
 
 
 def flatter(points: np.ndarray, chords: Chords) -> np.ndarray:
-    """Move points (2, m) on the smooth line to the other shape: towards the edges of the polygon by
-    what is in doubt, no further than the polygon itself.
-    """
+    """Move points (2, m) on the smooth line towards the polygon by what is in doubt."""
     begin, end, doubt = chords
     count = min(NEAREST, begin.shape[1])
     near = cKDTree(((begin + end) / 2).T).query(points.T, k=count)[1].reshape(-1, count)

@@ -11,8 +11,6 @@ m < 2 the pressure has a cusp or is infinite, and a width next to a steep edge c
 there is no rule for these.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, sqrt
 
@@ -55,7 +53,6 @@ FREE = 1 / 3  # by this share of the first seconds a mesh may be finer than an a
 # this size, of the rest with its square
 BODY, SETTLING = 0.4, 0.6
 SAFETY = 1.5  # on the constants, for scenes of other shapes and materials
-SHARE = 0.01  # of the accuracy, which the tolerance of the solver may take
 POWERS = (1.8, 6.5)  # exponents of a profile, between which the pressure and width are known
 PARABOLA = 2.2  # exponent up to which a width can be fitted
 
@@ -126,22 +123,18 @@ def propose(
         first, growing = contact.seconds(degree)
         elements = max(int(sqrt(FREE * first / growing)), needed)
         seconds = first + growing * elements**2
-        found.append(Proposal(degree, elements, SHARE * accuracy, seconds))
+        found.append(Proposal(degree, elements, 0.01 * accuracy, seconds))  # for the solver
     return min(found, key=lambda own: own.seconds, default=None)
 
 
 def half_space_fits(quantity: str, accuracy: float, size: float) -> bool:
-    """Whether a body of a size over the half-width of contact is a half-space to half of the
-    accuracy.
-    """
+    """Whether a body of a size over the half-width is a half-space to half of the accuracy."""
     error = SETTLING / size if quantity == "approach" else BODY / size**2
     return error <= accuracy / 2
 
 
 def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[str]:
-    """One sentence on what an accuracy takes, for a scene of one pair whose meshes are made for a
-    number of elements; none where there is no rule.
-    """
+    """One sentence on what an accuracy takes, for a scene of one pair; none without a rule."""
     if len(made.couplings) != 1 or any(part.given for part in scene.parts if part.elastic):
         return []
     own, edge = made.couplings[0], edge_of(scene, made)
@@ -178,9 +171,7 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
 
 
 def edge_of(scene: Scene, made: Posed) -> str:
-    """Where contact ends: 'free' if by itself, 'corner' if where a surface does, 'none' if the
-    surface turns around the body.
-    """
+    """Where contact ends: 'free' by itself, 'corner' with a surface, 'none' around a body."""
     own = made.couplings[0]
     size = float(np.ptp(own.positions, axis=1).max(initial=0.0)) or 1.0
     if scene.zone is not None or float(np.ptp(own.gap)) > CLOSE * size:

@@ -11,8 +11,6 @@ Lincei 27; Mindlin (1949), J. Appl. Mech. 16, 259-268; Mindlin and Deresiewicz (
 Mech. 20, 327-344; Johnson (1985), Contact Mechanics, sections 7.2(d), 7.4(a).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -142,10 +140,7 @@ def cycle_loss_point(
 
 
 def masing_branches(loads: Sequence[float]) -> list[tuple[float, float]]:
-    """The part of a history of loads that still counts by Masing's rules: for each branch the
-    change of the load along it, and 1 on the first loading or 2 after a reversal. Closed loops are
-    forgotten.
-    """
+    """The branches of a history that still count by Masing's rules, each with its factor 1 or 2."""
     points = [0.0]
     for load in loads:
         if len(points) > 1 and (points[-1] - points[-2]) * (load - points[-1]) >= 0:

@@ -7,8 +7,6 @@ polynomials, on panels that shrink towards the stick limit v = b where the tract
 singular integrals of the polynomials are exact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,8 +20,6 @@ SMALLEST = 1e-5  # panel, relative to min(b, 1)
 LARGEST_PANEL = 1.5  # panel; the kernels have poles at a distance of pi from the real line
 TAIL = 16.0  # the grid ends at b + TAIL: with what lies beyond, e^-TAIL is lost
 NEAR = 2.0  # half-lengths from a panel's centre up to which a singular kernel needs the exact rule
-# half-lengths from which a rule of 40 nodes is exact, while the recurrence for Q_m loses digits
-AWAY = 1.2
 
 NODES, WEIGHTS = legendre.leggauss(ORDER)
 # values -> P_m
@@ -32,9 +28,7 @@ LEFT = ORDER // 2  # nodes of the central panel at v < 0
 
 
 def _panel_edges(b: float) -> np.ndarray:
-    """Right ends of the panels, less b: equal ones from the centre, whose first reaches as far to
-    its left, refined on both sides of b, ended at TAIL.
-    """
+    """Right ends of the panels, less b: equal from the centre, refined beside b, ended at TAIL."""
     scale = min(b, 1.0)
     inward = [SMALLEST * scale]
     while inward[-1] / RATIO < 0.6 * scale:
@@ -136,9 +130,7 @@ class Panels:
         return matrix, central[LEFT:-1], central[-1]
 
     def log_tanh(self, parity: int) -> np.ndarray:
-        """(1/pi) int f(v) ln |tanh((u - v) / 2)| dv over the line: the primitive of the kernel 1 /
-        (pi sinh).
-        """
+        """(1/pi) int f(v) ln |tanh((u - v) / 2)| dv, from the primitive of 1 / (pi sinh)."""
         u, v, same = self.v[:, None], self.v, np.eye(len(self.v), dtype=bool)
         direct = np.abs(np.tanh(np.where(same, 1.0, self._distance()) / 2))
         mirror = np.tanh((u + v) / 2)
@@ -165,9 +157,7 @@ class Panels:
         return (kernel * self.weights + _fold(correction, parity)) / np.pi
 
     def abel(self, parity: int) -> np.ndarray:
-        """With p(x) = f(v) cosh(v): int_t^1 r p / sqrt(r^2 - t^2) dr (f even) or t int_t^1 p /
-        sqrt(r^2 - t^2) dr.
-        """
+        """int_t^1 r p / sqrt(r^2 - t^2) dr (f even) or t int_t^1 p / sqrt(r^2 - t^2) dr."""
         u, v, y = self.v[:, None], self.b + self.columns, self.columns[LEFT:]
         local, panel = self._local(), np.arange(len(self.half))
         own = (np.arange(len(y)) + LEFT)[:, None] // ORDER
@@ -229,16 +219,12 @@ def _fold(full: np.ndarray, parity: int) -> np.ndarray:
 
 
 def _cauchy_moments(x: np.ndarray) -> np.ndarray:
-    """int_-1^1 P_m(t) / (x - t) dt = 2 Q_m(x), (k, ORDER), DLMF 14.12.13; the principal value
-    inside.
-    """
+    """int_-1^1 P_m(t) / (x - t) dt = 2 Q_m(x), (k, ORDER): DLMF 14.12.13, principal values."""
     return np.where(_away(x), _by_quadrature(x, log=False), 2 * _second_kind(x)[:, :ORDER])
 
 
 def _log_moments(x: np.ndarray) -> np.ndarray:
-    """int_-1^1 P_m(t) ln |x - t| dt, (k, ORDER): primitives of the Cauchy moments, (2 m + 1) P_m =
-    (P_m+1 - P_m-1)'.
-    """
+    """int_-1^1 P_m(t) ln |x - t| dt, (k, ORDER), by (2 m + 1) P_m = (P_m+1 - P_m-1)'."""
     second = _second_kind(x)
     higher = 2 * (second[:, 2:] - second[:, : ORDER - 1]) / (2 * np.arange(1, ORDER) + 1)
     zeroth = (x + 1) * np.log(np.abs(x + 1)) - (x - 1) * np.log(np.abs(x - 1)) - 2
@@ -246,7 +232,7 @@ def _log_moments(x: np.ndarray) -> np.ndarray:
 
 
 def _away(x: np.ndarray) -> np.ndarray:
-    return np.abs(x[:, None]) > AWAY
+    return np.abs(x[:, None]) > 1.2  # half-lengths, where a rule of 40 nodes is exact
 
 
 def _by_quadrature(x: np.ndarray, log: bool) -> np.ndarray:

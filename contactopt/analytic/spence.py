@@ -17,8 +17,6 @@ eigenvalue problem for elastic contact with finite friction, Proc. Camb. Phil. S
 Spence (1975), J. Elasticity 5, 297-319. Half-space: Johnson (1985), eq (2.25), (3.18).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -64,9 +62,7 @@ class UnitPunch:
 
     @cached_property
     def _history(self) -> tuple[np.ndarray, np.ndarray]:
-        """int_v^inf of p / x^2 and q / x^2, dx, the last from 0; in the central panel without their
-        poles.
-        """
+        """int_v^inf of p / x^2 and q / x^2, dx, without their poles in the central panel."""
         v, central = self.panels.v, np.arange(len(self.p)) < LEFT
         p0, slope = (value * central for value in self.centre)
         p = (self.p * np.cosh(v) - p0) / np.sinh(v) ** 2

@@ -1,7 +1,5 @@
 """A campaign: the unfinished runs of an experiment, executed and stored one by one."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections import Counter
@@ -171,7 +169,7 @@ def run_reports(
 
 
 def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:
-    """Run an experiment anew in a folder of `work`, and put its small table into `target`."""
+    """Run an experiment again in a folder of `work`, and put its small table into `target`."""
     try:
         experiment = read_experiment(path, quick)
     except NothingToRun as error:

@@ -1,7 +1,5 @@
 """Tables of an experiment file or of a test set, whose lists and ranges are multiplied out."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -13,8 +11,6 @@ import numpy as np
 from contactopt.checks import check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table
-
-LARGEST_INTEGER = 2**63  # of whole numbers, as in TOML
 
 
 class Entries:
@@ -97,7 +93,7 @@ def _values_of(name: str, value: object) -> list[Any]:
         raise InputError(f"the list '{name}' is empty.")
     values = value if isinstance(value, list) else [value]
     for one in values:
-        large = isinstance(one, int) and abs(one) >= LARGEST_INTEGER
+        large = isinstance(one, int) and abs(one) >= 2**63  # of whole numbers, as in TOML
         if not isinstance(one, str | int | float) or large:
             raise InputError(
                 f"a value of '{name}' must be a text, a number, true or false; got {short(one)}."

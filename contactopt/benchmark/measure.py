@@ -3,8 +3,6 @@
 Runs in the campaign's process, where no plug-in is loaded.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform
@@ -110,9 +108,7 @@ def _machine() -> str:
 
 @cache
 def calibration() -> float:
-    """CPU time [s] of a fixed calculation, the least of five: products and factorisations of
-    matrices, and steps of Python, about half of the time each.
-    """
+    """CPU time [s], the least of five, of a fixed mix of linear algebra and steps of Python."""
     A = np.random.default_rng(0).random((100, 100)) + 100 * np.eye(100)
     seconds = []
     for _ in range(5):

@@ -1,5 +1,5 @@
 """Rows of several campaigns in one table. What others say of an answer is not believed: problems
-are built here anew, in a process of their own, and certificates computed from them.
+are built again here, in a process of their own, and certificates computed from them.
 """
 
 from __future__ import annotations
@@ -60,9 +60,7 @@ def joined(folder: Path, others: Sequence[str | Path]) -> tuple[pd.DataFrame, li
 def _recomputed(
     rows: pd.DataFrame, path: Path, files: dict[str, ProblemSpec]
 ) -> tuple[pd.DataFrame, list[str]]:
-    """Rows with certificates from their answers, without those where this is impossible; a sentence
-    for each reason.
-    """
+    """Rows with certificates from their answers; a sentence for each reason to leave out others."""
     found, builder = answers(path), Process()
     claims = rows[np.isfinite(rows["residual"])]
     why, certificates = dict.fromkeys(claims.index, ""), dict.fromkeys(claims.index, np.inf)

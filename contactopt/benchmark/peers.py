@@ -9,12 +9,10 @@ Q in rows of blocks (dim, dim), namely `indptr`, `indices` and `data`, `q` (k, d
 `solve` is timed.
 """
 
-from __future__ import annotations
-
 import inspect
 import json
+import pickle
 import subprocess
-import tempfile
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -26,15 +24,15 @@ import scipy.sparse as sp
 
 from contactopt.errors import InputError
 from contactopt.linear.operators import form, has_entries
-from contactopt.problem import InterfaceProblem, Status, dimensionless
+from contactopt.problem import InterfaceProblem, Scales, Status, dimensionless
 
-FIND_LIMIT = 60.0  # s for a Python to import the solver
-MOST_MEMORY = 500.0  # MB above which the process makes room for a new one after its answer
+Plain = tuple[str, tuple[int, ...], bytes]
+MOST_HELD = 256  # problems, which many solvers get after one another; a sequence has up to 100
 
 # What the other Python runs after the source of the three functions. Solvers print: what they say
 # goes to the standard error. The system ends the process when the solver exceeds its time.
 SERVER = """
-import json, os, signal, sys, time
+import json, os, pickle, signal, sys, time
 import numpy as np
 
 out = os.fdopen(os.dup(1), "w")
@@ -44,11 +42,23 @@ def memory(name):
     with open("/proc/self/status") as file:
         return next(int(line.split()[1]) * 1.024e-3 for line in file if line.startswith(name))
 
+def array(kind, shape, data):
+    return np.frombuffer(data, kind).reshape(shape).copy()
+
 version()
-for line in sys.stdin:
-    path, tol, limit, settings = json.loads(line)
+held = {}
+while True:
     try:
-        prepared = prepare(dict(np.load(path)), tol, settings)
+        key, parts, start, tol, limit, settings = pickle.load(sys.stdin.buffer)
+    except EOFError:
+        break
+    if parts is not None:
+        if len(held) == MOST_HELD:
+            held.clear()
+        held[key] = parts
+    try:
+        problem = {name: array(*part) for name, part in held[key].items()}
+        prepared = prepare(problem | {"start": array(*start)}, tol, settings)
         with open("/proc/self/clear_refs", "w") as file:
             file.write("5")  # forget the largest memory so far
         base = memory("VmRSS")
@@ -94,7 +104,7 @@ class PeerAnswer(Answer):
 
 @dataclass
 class Peer:
-    """A solver in the first of several Pythons that can import it.
+    """An external solver, run by the first of several Python interpreters that can import it.
 
     name     as it is called in messages
     install  the line that installs it
@@ -107,7 +117,11 @@ class Peer:
     version: Callable[[], str]
     prepare: Callable[..., Any]
     solve: Callable[[Any], Any]
-    process: subprocess.Popen[str] | None = field(default=None, init=False)
+    process: subprocess.Popen[bytes] | None = field(default=None, init=False)
+    # problems that the process holds, by fingerprint and dimension -> shape of q there, scales
+    held: dict[tuple[str, int], tuple[tuple[int, int], Scales]] = field(
+        default_factory=dict, init=False
+    )
 
     def found(self) -> tuple[str, str]:
         """A Python that imports the solver, and its version; InputError tells how to install it."""
@@ -140,28 +154,22 @@ class Peer:
         if not plain or law.stretch(problem.dim) is not None:
             raise InputError(f"{self.name} takes Coulomb's law only, not {type(law).__name__}.")
         if problem.dim not in dims and 3 not in dims:
-            raise InputError(f"this solver of {self.name} is one of the plane.")
-        if not has_entries(problem.Q):
-            problem = problem.explicit()
-        p, scales = dimensionless(problem)
-        if problem.dim not in dims:
-            p = _in_space(p)
-        Q = sp.bsr_array(sp.csr_array(p.Q), blocksize=(p.dim, p.dim))
-        Q.sort_indices()
-        begin = np.zeros(p.q.shape)
+            raise InputError(f"this solver of {self.name} takes problems in the plane only.")
+        key = problem.fingerprint, problem.dim if problem.dim in dims else 3
+        parts = None
+        if self.process is None or key not in self.held:
+            parts = self._hold(key, problem)
+        shape, scales = self.held[key]
+        begin = np.zeros(shape)
         if start is not None:
             begin[:, : problem.dim] = scales.to_dimensionless(start, problem.s)[0]
-        arrays = {"indptr": Q.indptr, "indices": Q.indices, "data": Q.data}
-        with tempfile.NamedTemporaryFile(suffix=".npz") as file:
-            np.savez(file, q=p.q, mu=p.mu, start=begin, **arrays)
-            file.flush()
-            reply = self._ask([file.name, tol, time_limit, settings])
+        reply = self._ask((key, parts, _plain(begin), tol, time_limit, settings))
         if reply is None:
             return Answer("time_limit", f"{self.name} was ended after {time_limit:g} s")
         if "error" in reply:
             return Answer("error", reply["error"])
         status = Status.SOLVED if reply["claimed"] else Status.SETTLED
-        r = np.array(reply["reactions"]).reshape(p.q.shape)[:, : problem.dim]
+        r = np.array(reply["reactions"]).reshape(shape)[:, : problem.dim]
         return PeerAnswer(
             status.label,
             reactions=scales.to_physical(r, problem.s)[0],
@@ -170,18 +178,34 @@ class Peer:
             measured=reply["measured"],
         )
 
-    def _ask(self, request: list[Any]) -> Any:
+    def _hold(self, key: tuple[str, int], problem: InterfaceProblem) -> dict[str, Plain]:
+        """What the process gets of a problem without units, to be held there until it ends."""
+        p, scales = dimensionless(problem if has_entries(problem.Q) else problem.explicit())
+        if problem.dim != key[1]:
+            p = _in_space(p)
+        Q = sp.bsr_array(sp.csr_array(p.Q), blocksize=(p.dim, p.dim))
+        Q.sort_indices()
+        if self.process is None or len(self.held) == MOST_HELD:
+            self.held.clear()
+        self.held[key] = p.q.shape, scales
+        arrays = {"indptr": Q.indptr, "indices": Q.indices, "data": Q.data, "q": p.q, "mu": p.mu}
+        return {name: _plain(array) for name, array in arrays.items()}
+
+    def _ask(self, request: tuple[Any, ...]) -> Any:
         """The reply to a request; None if the process was ended at the limit of time."""
         if self.process is None:
             parts = [inspect.getsource(part) for part in (self.version, self.prepare, self.solve)]
-            command = [self.found()[0], "-c", "\n".join([*parts, SERVER])]
+            program = "\n".join([*parts, f"MOST_HELD = {MOST_HELD}", SERVER])
             pipe = subprocess.PIPE
-            self.process = subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True)
+            self.process = subprocess.Popen(
+                [self.found()[0], "-c", program], stdin=pipe, stdout=pipe
+            )
         assert self.process.stdin and self.process.stdout
-        print(json.dumps(request), file=self.process.stdin, flush=True)
+        pickle.dump(request, self.process.stdin, 4)
+        self.process.stdin.flush()
         if line := self.process.stdout.readline():
             reply = json.loads(line)
-            if reply.get("measured", {}).get("peak_mb", 0.0) > MOST_MEMORY:
+            if reply.get("measured", {}).get("peak_mb", 0.0) > 500.0:  # then a new process follows
                 self.process.kill()
                 self.process.wait()
                 self.process = None
@@ -192,12 +216,20 @@ class Peer:
         raise RuntimeError(f"{self.name} ended its process with code {code}")
 
 
+def _plain(array: np.ndarray) -> Plain:
+    """An array in a form that does not depend on the version of NumPy."""
+    return array.dtype.str, array.shape, array.tobytes()
+
+
 @cache
 def _said(python: str, program: str) -> str:
     """The version that a program prints; '' if this Python cannot run it."""
     try:
         done = subprocess.run(
-            [python, "-c", program], capture_output=True, text=True, timeout=FIND_LIMIT
+            [python, "-c", program],
+            capture_output=True,
+            text=True,
+            timeout=60.0,  # s to import the solver
         )
     except (OSError, subprocess.TimeoutExpired):
         return ""
@@ -206,9 +238,7 @@ def _said(python: str, program: str) -> str:
 
 
 def _in_space(problem: InterfaceProblem) -> InterfaceProblem:
-    """A problem of the plane with a second tangent along which nothing moves: Q gets there the mean
-    of its diagonal, and q gets 0.
-    """
+    """A problem of the plane with a second tangent along which nothing moves."""
     k = len(problem.q)
     Q, new = problem.Q, float(problem.Q.diagonal().mean()) * sp.eye_array(k)
     order = np.concatenate([np.arange(2 * k).reshape(k, 2), 2 * k + np.arange(k)[:, None]], axis=1)

@@ -4,8 +4,6 @@ The campaign's process runs the file, to know what it declares; the functions ar
 only.
 """
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import sys
@@ -39,7 +37,7 @@ class Plugin:
 
     @property
     def version(self) -> str:
-        """Of its peer, '' without; InputError if the peer is not installed."""
+        """The version of its peer, '' without one; InputError if the peer is not installed."""
         return "" if self.peer is None else f"{self.peer.name} {self.peer.found()[1]}"
 
     @property

@@ -1,7 +1,5 @@
 """Problems of an experiment file: scenes, FCLib files and generated families."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -80,9 +78,7 @@ class ProblemSpec:
                 raise InputError(f"family '{self.name}': {error}.") from error
 
     def build(self, declared: Mapping[str, Callable[..., Any]]) -> InterfaceProblem | Sequence:
-        """The problem, or a sequence; InputError on parameters that make none. `declared` as for
-        `check`.
-        """
+        """The problem, or a sequence; InputError on parameters that make none."""
         if self.kind == "scene":
             return reduced(self.name, **self.parameters)
         if self.kind == "fclib":

@@ -2,8 +2,6 @@
 that it started, and what it printed last.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -23,7 +21,6 @@ from contactopt.files.writing import broken_pipe_is_an_error
 LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "RAYON")
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in LIBRARIES} | {"VECLIB_MAXIMUM_THREADS": "1"}
 START = "start"  # the phase until the process answers at all
-START_LIMIT = 120.0  # s for it
 # of a process that is killed in it: once may be chance, each time is its limit of memory
 STARTS = 3
 BEAT = 0.1  # s between two looks at what a busy process printed
@@ -90,14 +87,12 @@ class Process:
             theirs.close()
 
     def ask(self, limit: float, phase: str, function: Callable[..., Any], *arguments: Any) -> Any:
-        """What a function returns that the process calls; Ended, with `phase`, if it died or took
-        more than `limit` seconds. One that died before the call is started anew, STARTS times.
-        """
+        """What a called function returns; Ended, with `phase`, if it died or took too long."""
         for _ in range(STARTS):
             self.start()
             try:
                 if not self.ready:
-                    self.ready = self._wait(START_LIMIT, START)
+                    self.ready = self._wait(120.0, START)  # s to start
                 with broken_pipe_is_an_error():
                     self.pipe.send((function, arguments))
                 break
@@ -159,9 +154,7 @@ class Process:
         return "crashed", one_line(f"{name}: {last}".rstrip(": "))
 
     def interrupt(self) -> None:
-        """Kill the process and all that it started, also from another thread; the one that uses the
-        process sees it end.
-        """
+        """Kill the process and all that it started, also from another thread."""
         import psutil
 
         process = self.process
@@ -185,9 +178,7 @@ class Process:
 
 
 def serve(pipe_number: int, parent: int) -> None:
-    """What the process does: it calls the functions that come, and ends with the campaign, the
-    process of the number `parent`. What it starts remains its child whatever else ends.
-    """
+    """What the process does: it calls the functions that come, and ends with `parent`."""
     if sys.platform == "linux":
         import ctypes
 

@@ -206,9 +206,7 @@ def ranking(points: pd.DataFrame, accuracy: float) -> pd.DataFrame:
 
 
 def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
-    """The leader table of a report at a certificate; in the order of names and without a comparison
-    where the machine was busy, or where machines cannot be compared.
-    """
+    """The leader table at a certificate; by names alone where machines were busy or differ."""
     found = ranking(points(table), accuracy)
     shown = {
         "method": found["method"],
@@ -231,9 +229,7 @@ def leader_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
 
 
 def coverage_table(table: pd.DataFrame, accuracy: float = 1e-6) -> pd.DataFrame:
-    """Which problems a method takes, how many of them it brings to a certificate, and what it says
-    of the others most often.
-    """
+    """Which problems a method takes, how many it solves, and what it says of the others most."""
     import pandas as pd
 
     found = points(table)
@@ -296,9 +292,7 @@ def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
 
 
 def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The even and the odd repeats of the problems that were run again, two reruns of a table; a
-    run that was made once stands in both.
-    """
+    """The even and the odd repeats of repeated problems, as two tables; a single run is in both."""
     table = table[table["problem"].isin(table.loc[table["repeat"] > 0, "problem"])]
     single = table.groupby(POINT)["repeat"].transform("size") == 1
     even = table["repeat"] % 2 == 0

@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 ACCURACIES = 1e-2, 1e-11, 10  # certificates of `time_to_accuracy`: first, last, how many
 # residuals below this fraction of the tolerance asked for are drawn there: they answer no question
 FLOOR = 1e-2
-LONGEST = 20  # characters of a label
 CELLS = 240  # of a map, above which no numbers are written into them
 NO_LABELS: Mapping[str, str] = MappingProxyType({})
 NAMES = {
@@ -62,7 +61,7 @@ NAMES = {
 
 
 def _look(rank: int) -> dict[str, Any]:
-    """Of a line by its rank: the eight first have colours."""
+    """The look of a line by its rank: the first eight have colours."""
     return {"color": COLOURS[rank], "lw": LINE} if rank < len(COLOURS) else dict(FAINT)
 
 
@@ -337,7 +336,7 @@ def short_label(name: str, labels: Mapping[str, str] = NO_LABELS) -> str:
     if name in labels:
         return str(labels[name])
     head, bracket, settings = name.partition("(")
-    if len(name) <= LONGEST or not bracket:
+    if len(name) <= 20 or not bracket:
         return name
     words = [head]
     for setting in settings.rstrip(")").split(", "):

@@ -77,9 +77,7 @@ def layouts(experiments: Sequence[str | Path]) -> list[Experiment]:
 
 
 def build(experiments: Sequence[str | Path], reports: str | Path) -> list[Experiment]:
-    """Rebuild the report of every experiment that has a table in `reports`, and return those that
-    have one; InputError if none has, or if a figure's arguments do not fit its table.
-    """
+    """Rebuild the report of every experiment with a table; InputError if none has one."""
     require("markdown_it", "pandas")
     made = [one for one in layouts(experiments) if has_table(Path(reports) / one.name)]
     if not made:
@@ -132,9 +130,7 @@ def write_report(
 
 
 def _drawn(layout: Experiment, number: int, entry: Mapping[str, Any], table: pd.DataFrame) -> Any:
-    """What a figure's function makes of its rows; a sentence where none fits, and None where the
-    figure is optional.
-    """
+    """What a figure's function makes of its rows, or a sentence, or None if it is optional."""
     kind, where = entry["kind"], entry.get("where", {})
     arguments = {key: value for key, value in entry.items() if key not in OWN_KEYS}
     try:

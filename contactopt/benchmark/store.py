@@ -117,9 +117,7 @@ class Store:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl. What is no row of a campaign is left out, with a warning that names
-    its line; InputError on a newer schema.
-    """
+    """The rows of a rows.jsonl, others with a warning left out; InputError on a newer schema."""
     with open(path, "rb") as file:
         for number, line in enumerate(file, 1):
             try:
@@ -179,17 +177,13 @@ def _unpack(text: str) -> np.ndarray:
 
 
 def save_answers(folder: Path) -> None:
-    """Write the answers of a campaign into a file beside its table: key of the row -> forces and
-    then multipliers, flat.
-    """
+    """Write the answers beside a table: key of the row -> forces and multipliers, flat."""
     with whole_file(folder / ANSWERS) as file, open(file, "wb") as open_file:
         np.savez_compressed(open_file, **_answers_in(folder / "rows.jsonl"))
 
 
 def answers(path: Path) -> dict[str, np.ndarray]:
-    """The answers beside a table, as `save_answers` writes them; those of its lines without the
-    file. InputError if the file cannot be read.
-    """
+    """The answers beside a table, or else those of its lines; InputError for a broken file."""
     folder = path if path.is_dir() else path.parent
     file, rows = folder / ANSWERS, folder / "rows.jsonl"
     if not file.exists():
@@ -275,9 +269,7 @@ def _from_text(path: Path) -> pd.DataFrame:
 
 
 def _of_their_kinds(table: pd.DataFrame, path: Path, word: str, first: int) -> pd.DataFrame:
-    """A table with values of the kinds of COLUMNS; rows with others are left out, with a warning
-    that names the first of them, counted from `first`.
-    """
+    """The rows with values of the kinds of COLUMNS; a warning names the first of the others."""
     import pandas as pd
 
     wrong = pd.Series("", index=table.index)

@@ -17,9 +17,7 @@ INSTANCE = ["problem", "setting"]
 
 
 def select(table: pd.DataFrame, **where: object) -> pd.DataFrame:
-    """The rows whose columns have the values `where`, one, a list or '' for none; InputError on an
-    unknown column, or if no row is left.
-    """
+    """The rows whose columns have the values `where`; InputError if there are none."""
     rows = table
     for column, value in where.items():
         if column not in rows:
@@ -34,9 +32,7 @@ def select(table: pd.DataFrame, **where: object) -> pd.DataFrame:
 def told(
     table: pd.DataFrame, *findings: Callable[[pd.DataFrame], str | Sequence[str]]
 ) -> list[str]:
-    """The sentences of the functions of a table; one whose rows are not there (InputError) says so
-    instead.
-    """
+    """The sentences of the functions of a table, or of their InputErrors."""
     sentences: list[str] = []
     for finding in findings:
         try:

@@ -2,8 +2,6 @@
 at any moment (contactopt.benchmark.process), keep what was loaded, and judge nothing.
 """
 
-from __future__ import annotations
-
 import errno
 import inspect
 import os
@@ -210,9 +208,7 @@ def _along(call: Call, problem: InterfaceProblem | States, limit: float) -> Answ
 
 
 def _call(task: Task) -> Call:
-    """A method ready to be called with a problem, whether it starts from the answer to its last
-    problem, and a limit of time; it answers in whatever form. Its own errors pass through.
-    """
+    """A method to be called, whether it starts from its last answer, and a limit of time."""
     spec, usual = task.run.method, task.run.setting == "default"
     plugin = _kept.plugins.find(spec.name) if spec.foreign else None
     given: dict[str, Any] = {

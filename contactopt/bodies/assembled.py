@@ -168,7 +168,7 @@ class AssembledBody(ABC):
         The surface, which holds the contact normals to be used (they may be the body's own), and
         the initial gap (k,) [length].
         """
-        raise InputError(f"body '{self.name}' has contacts of its own; couple it by them.")
+        raise InputError(f"body '{self.name}' has its own contact surfaces; couple one of them.")
 
     @property
     def work(self) -> Work:

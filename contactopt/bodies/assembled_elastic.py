@@ -1,7 +1,5 @@
 """An elastic body whose surfaces are known, before it is condensed (contactopt.bodies.elastic)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -85,9 +83,7 @@ class AssembledElastic(AssembledMatrices):
 
     @cached_property
     def surfaces(self) -> dict[str, Surface]:
-        """All contact surfaces, made once: a surface may take part in several pairs. Their nodes
-        are placed on the curves that the part gives.
-        """
+        """All contact surfaces, made once, with nodes on the curves that the part gives."""
         return {name: self._surface(name) for name in self.body.traces}
 
     def _surface(self, name: str) -> Surface:
@@ -160,9 +156,7 @@ class AssembledElastic(AssembledMatrices):
 def alone_of(
     trace: Trace, unknowns: np.ndarray, held: np.ndarray
 ) -> tuple[sp.csr_matrix, ...] | None:
-    """The displacement of the nodes at the contacts by themselves, component by component; None
-    where it is that of the contacts.
-    """
+    """The displacement of nodes at contacts alone; None where it is that of the contacts."""
     k, W = len(trace.nodes), trace.weights
     own = sp.csr_matrix((np.ones(k), (np.arange(k), trace.nodes)), W.shape)
     if not abs(W - own).max():

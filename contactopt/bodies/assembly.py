@@ -1,7 +1,5 @@
 """One elastic body as matrices: stiffness, loads, held and driven unknowns, contact nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -129,7 +127,7 @@ class Assembly(Matrices):
 
     @property
     def degree(self) -> int:
-        """Of the displacement in every element, 1 or 2."""
+        """The degree of the displacement in every element, 1 or 2."""
         return 1 if self.unknowns.shape[1] == self.basis.mesh.nvertices else 2
 
     @cached_property

@@ -60,8 +60,6 @@ TIED = {
 }
 Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
-SMOOTH = 6  # order of the quadrature of a load on curved faces
-NOISE = 1e-14  # what rounding leaves of a zero
 
 
 class Trace(NamedTuple):
@@ -254,9 +252,7 @@ def opposed(place: np.ndarray) -> str:
 def surface_load(
     basis: skfem.CellBasis, boundary: np.ndarray, density: Density, weight: Weight
 ) -> np.ndarray:
-    """The forces (N,) on the unknowns of a load on facets (f,), of a density [stress] at places and
-    their outward normals.
-    """
+    """The forces (N,) of a density [stress] at places and their outward normals on facets (f,)."""
     at, places, measure = _rule(basis, boundary, weight)
     stress = np.broadcast_to(density(places, at.normals), places.shape)
     forces = np.einsum("fiq,dfq,fq->idf", at.values(basis.elem.elem), stress, measure)
@@ -276,7 +272,7 @@ def _rule(
     basis: skfem.CellBasis, boundary: np.ndarray, weight: Weight
 ) -> tuple[Faces, np.ndarray, np.ndarray]:
     """Points of a quadrature on facets (f,), their places (dim, f, q) and weights (f, q)."""
-    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], SMOOTH)
+    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], 6)  # for curved faces
     at = Faces(basis.mesh, np.asarray(boundary), points)
     places = at.places
     return at, places, at.scale * share * weight_at(weight, places)
@@ -360,9 +356,7 @@ class Faces:
 
 
 def _numbered(basis: skfem.CellBasis, nodal: Faces) -> tuple[np.ndarray, np.ndarray]:
-    """Which of an element's shape functions, and which node of the mesh, is at each of the places
-    (f, j) of `nodal`: the one that is 1 there.
-    """
+    """Which shape function of an element, and node of the mesh, is 1 at each place (f, j)."""
     dim = len(basis.mesh.p)
     local = np.argmax(nodal.values(basis.elem.elem), axis=1)
     return local, basis.element_dofs[::dim][local, nodal.owner[:, None]] // dim
@@ -370,4 +364,4 @@ def _numbered(basis: skfem.CellBasis, nodal: Faces) -> tuple[np.ndarray, np.ndar
 
 def _clean(values: np.ndarray) -> np.ndarray:
     """The values with those that are only rounding errors set to zero."""
-    return np.where(np.abs(values) < NOISE, 0.0, values)
+    return np.where(np.abs(values) < 1e-14, 0.0, values)  # what rounding leaves of a zero

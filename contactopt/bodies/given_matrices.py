@@ -1,7 +1,5 @@
 """The matrices of a body that another code has assembled, its solver if it gave one, its file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,9 +51,7 @@ class GivenMatrices(Matrices):
         return np.asarray((self.moving @ U)[self.unknowns])
 
     def write_vtu(self, path: Path, U: np.ndarray, force: np.ndarray) -> None:
-        """Write the points and the facets of all surfaces with the displacement, the contact forces
-        and, where they are known, the forces of supports and plates and the stresses at the points.
-        """
+        """Write points and facets with displacement, forces and known stresses."""
         import meshio
 
         data = {"displacement": self.at_points(U), "force": force[self.unknowns]}

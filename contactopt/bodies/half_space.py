@@ -204,7 +204,7 @@ class HalfSpaceBody(UndividedBody):
         return np.concatenate([F, np.zeros(m), -F.reshape(-1, dim).sum(axis=0)])
 
     def loaded(self, scene: Scene, part: HalfSpace) -> HalfSpaceBody:
-        """With other values of the total force and of the displacement."""
+        """The same body with another total force and another displacement."""
         return replace(self, part=part)
 
 

@@ -50,7 +50,7 @@ class _SolvedBody(ElasticBody):
 
 @dataclass(frozen=True, eq=False)
 class MatrixBody(AssembledMatrices):
-    """The matrices of a MatrixPart with their part of the scene."""
+    """The assembled matrices of a body that a MatrixPart gives."""
 
     body: GivenMatrices
     part: MatrixPart
@@ -76,9 +76,7 @@ class MatrixBody(AssembledMatrices):
         return Work(body.A.nnz, len(body.contact_dofs), *sizes)
 
     def guides(self) -> Guides:
-        """Coordinate planes, the body on one side, all of whose points are held along the axis, and
-        not in all components.
-        """
+        """Coordinate planes beside the body, whose points are held along the axis alone."""
         body, x = self.body, self.body.locations
         extent = np.stack([x.min(axis=1), x.max(axis=1)], axis=1)
         near = EQUAL * float(np.ptp(extent, axis=1).max())
@@ -273,9 +271,7 @@ class _Points:
     fixed: np.ndarray
 
     def with_centres(self, facets: np.ndarray) -> tuple[_Points, np.ndarray]:
-        """Facets of 8 points with a centre that moves as their shape functions say: by -1/4 of the
-        corners and 1/2 of the middles of the edges.
-        """
+        """Facets of 8 points with a centre: -1/4 of the corners and 1/2 of the middles."""
         share, (many, count) = np.repeat([-0.25, 0.5], 4), (len(facets), self.x.shape[1])
         rows, values = np.repeat(np.arange(many), 8), np.tile(share, many)
         added = [

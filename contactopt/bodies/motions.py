@@ -19,8 +19,6 @@ solution algorithm, Int. J. Numer. Meth. Engng 32, 1205-1227, for floating bodie
 multipliers of the interface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,9 +53,7 @@ class Motions:
 
 
 def work(fields: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """The resultants (m,) of nodal forces (n,) in motions (n, m); zero, where they balance each
-    other, in place of what rounding leaves.
-    """
+    """The resultants (m,) of nodal forces (n,) in motions (n, m), rounding made zero."""
     found = fields.T @ forces
     return np.where(np.abs(found) > BALANCED * (np.abs(fields).T @ np.abs(forces)), found, 0.0)
 
@@ -115,9 +111,7 @@ def motion_labels(components: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def kernel(held: np.ndarray, labels: tuple[str, ...]) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Combinations (m, j) of m motions that leave the held unknowns (h, m) at rest, with their
-    names; translations and rotations that are free by themselves are columns of their own.
-    """
+    """Combinations (m, j) of motions that leave held unknowns at rest, pure ones first; names."""
     count = len(labels)
     values, vectors = np.linalg.eigh(held.T @ held)
     kernel = vectors[:, values < ROUNDED * len(held)] if len(held) else np.eye(count)

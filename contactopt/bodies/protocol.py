@@ -130,9 +130,7 @@ class Body(ABC):
 
     @abstractmethod
     def loaded(self, scene: Scene, part: Any) -> Body:
-        """The same body under the loads of another scene, whose part stands for it; InputError if
-        more than load values differ.
-        """
+        """The same body under another scene's loads; InputError if more than load values differ."""
 
     @abstractmethod
     def carried(self, component: int) -> tuple[np.ndarray, np.ndarray]:

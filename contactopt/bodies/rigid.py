@@ -92,9 +92,7 @@ class RigidBody(UndividedBody):
         return surface, gap
 
     def _check_side(self, other: Surface, facing: np.ndarray, gap: np.ndarray) -> None:
-        """Refuse a normal away from the other body where they are nearest; `facing` (k,) is its
-        cosine with the normal that the other body suggests.
-        """
+        """Refuse a normal away from the other body, where their cosines `facing` are < 0."""
         nearest = gap <= gap.min(initial=np.inf) + EQUAL * float(np.max(np.abs(gap), initial=0.0))
         if (
             self.part.normal is not None

@@ -45,8 +45,6 @@ from contactopt.errors import InputError
 from contactopt.meshes.cells import straight
 from contactopt.meshes.structured import simplices
 
-# how far beyond an element a point may lie, over its size: an arc lies beyond a coarse mesh
-OUTSIDE = 0.2
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
 STEEP = 12.0  # of the weights: `pytest tests/test_recovery.py -k hole`, error 0.08, with 0: 0.20
 
@@ -77,9 +75,7 @@ class StressMap:
         return self.body.basis.mesh
 
     def stress(self, U: np.ndarray) -> np.ndarray:
-        """The recovered stress (m, 4 or 6) at every place under a displacement U (n,), components
-        as in contactopt.scenes.kinds.
-        """
+        """The recovered stress (m, 4 or 6) at every place under a displacement U (n,)."""
         return (
             np.stack([self.weights @ (rows @ U) for rows in self._element_stress], axis=1)
             * self.even
@@ -103,9 +99,7 @@ class StressMap:
         return np.asarray(self.used[np.unique(self.fit.column[chosen] // len(self.basis.W))])
 
     def transposed(self, slopes: np.ndarray) -> np.ndarray:
-        """The derivative (n,) by the displacement of a function with the derivatives `slopes` (m, 4
-        or 6) by the recovered stress.
-        """
+        """The derivative by U (n,), from that by the recovered stress (m, 4 or 6)."""
         columns = zip(self._element_stress, (slopes * self.even).T)
         return np.asarray(sum(rows.T @ (self.weights.T @ slope) for rows, slope in columns))
 
@@ -189,9 +183,7 @@ def _both_sides(
 
 
 def _places(name: str, mesh: Mesh, region: Region) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-    """Places (dim, m), the vertices there or -1 (m,), and the vertices (m, vertices) whose elements
-    make each patch.
-    """
+    """Places (dim, m), the vertices there or -1 (m,), and the vertices of each patch."""
     count = mesh.p.shape[1]
     vertices, point = np.unique(mesh.t), np.asarray(region.point, dtype=float)
     if region.boundary:
@@ -214,7 +206,7 @@ def _places(name: str, mesh: Mesh, region: Region) -> tuple[np.ndarray, np.ndarr
     places = mesh.p[:, vertices]
     if len(point):
         corners, beyond = _holder(mesh, point)
-        if beyond <= OUTSIDE:
+        if beyond <= 0.2:  # of its size: an arc lies beyond a coarse mesh
             own = sp.csr_matrix(
                 (np.ones(len(corners)), (np.zeros(len(corners), int), corners)), (1, count)
             )
@@ -230,9 +222,7 @@ def _places(name: str, mesh: Mesh, region: Region) -> tuple[np.ndarray, np.ndarr
 
 
 def _holder(mesh: Mesh, point: np.ndarray) -> tuple[np.ndarray, float]:
-    """The corners of the simplex that holds a point, or comes nearest to it, and by how much of its
-    size it misses it.
-    """
+    """The corners of the simplex nearest to a point, and by how much of its size it misses it."""
     cells = simplices(mesh)
     origin = cells.p[:, cells.t[0]]
     edges = cells.p[:, cells.t[1:]] - origin[:, None]
@@ -310,7 +300,7 @@ class PatchFit:
     def deviation(self, values: np.ndarray) -> np.ndarray:
         """Standard error (m,) of the fit of values (points,), from what the fit leaves.
 
-        Of noise of variance v, sum_q w_q (what the fit leaves)^2 has the mean
+        If the values are noise of variance v, sum_q w_q (what the fit leaves)^2 has the mean
         v (sum_q w_q - tr(M1^-1 M2)), where M1 and M2 are the moments with the weights w and w^2.
         """
         count, own, w = len(self.inverse), values[self.column], self.weight
@@ -330,9 +320,7 @@ def _fit(
     steep: np.ndarray,
     terms: list[tuple[int, ...]],
 ) -> PatchFit:
-    """The fits of points at `offset` (dim, p) from the places to which `row` says they belong, with
-    weights that fall as `steep` (m,) says.
-    """
+    """The fits of points at `offset` from the places `row`, with weights as `steep` (m,) says."""
     size = np.zeros(len(steep))
     np.maximum.at(size, row, np.linalg.norm(offset, axis=0))
     scaled = offset / size[row]

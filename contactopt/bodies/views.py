@@ -35,9 +35,7 @@ def plates(body: Body, U: np.ndarray) -> dict[str, float]:
 
 
 def acting(view: Matrices, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where forces (n,) on the unknowns act: positions (dim, m) of nodes [length] and the forces
-    (dim, m) there [force].
-    """
+    """The positions (dim, m) of the nodes where forces (n,) act, and the forces (dim, m)."""
     nodal = force[view.unknowns]
     nodes = np.flatnonzero(nodal.any(axis=0))
     return view.locations[:, nodes], nodal[:, nodes]
@@ -119,9 +117,7 @@ def added_work(
 
 
 def on_elements(body: Body, values: np.ndarray) -> np.ndarray:
-    """Values (n,) of the displacement unknowns, dealt out evenly to the elements (elements,) that
-    have each; (0,) for a body without elements.
-    """
+    """Values (n,) of the unknowns, dealt out evenly to the elements (elements,) that have each."""
     elements = elements_of(body)
     if elements is None:
         return np.zeros(0)

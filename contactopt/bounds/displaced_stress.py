@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])  # of a quadrilateral
 STEPS = 8  # of Newton's method for a place in a quadrilateral, at most
-SAME = 1e-14  # of the coordinates
 
 
 class Halves(NamedTuple):
@@ -83,15 +82,13 @@ def displaced_stress(
 
 
 def bilinear(x: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bilinear shape functions (4, e, s) and their slopes (4, 2, e, s) at points (2, e, s) of
-    quadrilaterals with the corners x (2, 4, e).
-    """
+    """Bilinear shape functions (4, e, s) and slopes (4, 2, e, s) at points of quadrilaterals."""
     place, reach = np.full(wanted.shape, 0.5), np.abs(wanted).max(initial=0.0)
     for _ in range(STEPS):
         N, by_place = _shapes(place)
         left = wanted - sum(x[:, q, :, None] * N[q] for q in range(4))
         place = place + np.sum(_inverse(x, by_place) * left, axis=1)
-        if np.abs(left).max(initial=0.0) <= SAME * reach:
+        if np.abs(left).max(initial=0.0) <= 1e-14 * reach:  # of the coordinates
             break
     N, by_place = _shapes(place)
     inverse = _inverse(x, by_place)

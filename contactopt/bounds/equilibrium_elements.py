@@ -12,9 +12,9 @@ revolution, are polynomials of this degree on each edge. On the axis S is zero, 
 stress finite.
 
 Unknown are the tractions S n at points of the edges, so many that they determine the polynomials.
-They hold every element in balance. Of all stresses in an element that have these tractions that one
-is taken which makes the energy of s - s(u) least, and then the tractions that make it least in the
-whole body: a sparse linear system. The displacement u may be any one.
+They hold every element in balance. Among all stresses in an element with these tractions, the one
+with the smallest energy of s - s(u) is taken, and then the tractions for which this energy is
+smallest in the whole body: a sparse linear system. Any displacement u is allowed.
 
 Integrals with 1 / r are taken by a rule on each part of a triangle.
 
@@ -22,8 +22,6 @@ Source: Fraeijs de Veubeke (1965), Displacement and equilibrium models in the fi
 for tractions as unknowns; Love (1927), A treatise on the mathematical theory of elasticity, section
 188, for bodies of revolution; else as contactopt.bounds.split_triangle.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,9 +105,7 @@ class EquilibriumElements(Simplices):
 
     @cached_property
     def bilinear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Shape functions (e, 4, s) of the quadrilaterals, and their slopes (e, 4, 2, s), at
-        points.
-        """
+        """Shape functions (e, 4, s) and slopes (e, 4, 2, s) of quadrilaterals."""
         places = np.einsum("dve,vs->des", self.mesh.p[:, self.mesh.t], self._points)
         N, slopes = bilinear(self.mesh.p[:, self.corners], places)
         return np.ascontiguousarray(N.swapaxes(0, 1)), np.ascontiguousarray(
@@ -134,8 +130,8 @@ class EquilibriumElements(Simplices):
         moments: np.ndarray,
         answer: object = None,
     ) -> tuple[np.ndarray, float]:
-        """The stress (e, s, 4) of this module's head that is nearest to `stress`, and the largest
-        force out of balance over the largest one. Arguments as of Tetrahedra.equilibrated(), but
+        """The stress (e, s, 4) defined at the top that is nearest to `stress`, and the largest
+        force out of balance over the largest one. Arguments as in Tetrahedra.equilibrated(), but
         `moments` (facets, 2, 2) take hat functions, if revolved times r.
         """
         g, number = self._given(held, moments).ravel(), self._numbers[0]
@@ -207,9 +203,7 @@ class EquilibriumElements(Simplices):
 
     @cached_property
     def _numbers(self) -> tuple[np.ndarray, np.ndarray]:
-        """(e, 6 (k + 1)) the places of an element's tractions among those of all edges, which are
-        (facets, k + 1, 2); and their signs.
-        """
+        """(e, 6 (k + 1)) the places among all (facets, k + 1, 2) tractions; signs."""
         count = self.degree + 1
         along = np.arange(count)
         backwards = self.slots[:, 0].T[..., None] == 1  # (e, 3, 1)
@@ -225,9 +219,7 @@ class EquilibriumElements(Simplices):
         return out
 
     def _balance(self, force: np.ndarray) -> tuple[sp.csr_matrix, np.ndarray]:
-        """The forces on elements by the tractions, and those of the load: along z, or in plane
-        strain along both axes and about the centroid.
-        """
+        """Forces on elements by tractions, and by the load: also about centroids."""
         number, sign = self._numbers
         count, lever = self.degree + 1, LEVERS[self.degree]
         corners = self.mesh.p[:, self.mesh.t]

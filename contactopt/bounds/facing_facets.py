@@ -4,8 +4,6 @@ intervals in the plane. In space they are triangles, of which polygons are made 
 contactopt.coupling.segments cuts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import combinations
@@ -27,7 +25,6 @@ from contactopt.solving.solve_scene import Solved
 
 SPLIT = {2: 16, 3: 4}  # parts of an edge of a contact facet for integrals over it
 PARTS = {2: 16, 3: 2}  # and of an edge of a piece of one
-FACING = -0.5  # the cosine between opposite normals is below this
 
 
 class Points(NamedTuple):
@@ -164,9 +161,7 @@ class FacingFacets:
         return out
 
     def lift(self, nodal: Sequence[np.ndarray], height: np.ndarray, component: int = 0) -> None:
-        """Add to the gap, or to a component of the slip, (f, q) at the nodes of facets, at shared
-        nodes the largest.
-        """
+        """Add (f, q) at nodes to gap or slip component; at shared ones the largest."""
         side = self.sides[0]
         added = np.full(nodal[side.body].shape[1], -np.inf)
         np.maximum.at(added, side.nodes, height.T)
@@ -244,13 +239,11 @@ def _meeting(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray
         axis = np.zeros((centre.shape[1] + 1, len(centre)))
         axis[-1] = up
         balls.append(Facets(np.vstack([centre.T, 0 * radius]), radius, axis, 0 * radius))
-    return facing_pairs(balls[0], balls[1], FACING)
+    return facing_pairs(balls[0], balls[1], -0.5)  # the cosine of opposite normals
 
 
 def _common(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The common parts (S, v, dim - 1) of pairs of facets, some empty, and the pair of each (S,).
-    In space a fan of triangles makes up each.
-    """
+    """The common parts (S, v, dim - 1) of pairs of facets, in space fans, and their pair (S,)."""
     if own.shape[2] == 1:
         low = np.maximum(own.min(axis=1), other.min(axis=1))
         high = np.minimum(own.max(axis=1), other.max(axis=1))
@@ -335,9 +328,7 @@ def facet_nodes(d: int) -> np.ndarray:
 
 @cache
 def facet_rule(d: int, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Shares (dim, s) of the vertices of a facet, and weights (s,) that add up to one, from n parts
-    of every edge.
-    """
+    """Shares (dim, s) of a facet's vertices, weights (s,) of sum one; edges in n parts."""
     x, w = get_quadrature(RefLine if d == 2 else RefTri, 4)
     local = np.concatenate([1 - x.sum(axis=0, keepdims=True), x])
     if d == 2:

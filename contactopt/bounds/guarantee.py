@@ -1,7 +1,5 @@
 """What is guaranteed, and not only estimated, of the error of a solved scene."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -49,9 +47,7 @@ class Guarantee:
 
 
 def bounded(solved: Solved, quantity: Quantity, value: float) -> Guarantee:
-    """What is guaranteed of the displacement and of a quantity, whose value on the last mesh is
-    `value`. The Guarantee says why where there is no bound.
-    """
+    """What is guaranteed of the displacement and of a quantity, and why where there is no bound."""
     scene = solved.reduction.scene
     bodies = [getattr(body, "body", None) for body in solved.reduction.bodies]
     meshes = [own.basis.mesh for own in bodies if own is not None]

@@ -61,7 +61,6 @@ if TYPE_CHECKING:
     from contactopt.bounds.bound import Bound
 
 TINY, HUGE = 1e-200, 1e200
-TRIED = 3  # adjoints of a quantity, each with what the one before tells
 ENERGY = "energy"
 LINEAR = "approach", "shift", "normal_force", "shear_force", "resultant"
 
@@ -78,9 +77,7 @@ class _Adjoint(NamedTuple):
 
 
 def interval(bound: Bound, quantity: Quantity) -> tuple[float, float]:
-    """The middle and half the width of an interval in which the exact value of a quantity lies,
-    which is one of LINEAR or the energy. InputError, one sentence, where there is no interval.
-    """
+    """The middle and half-width of an interval that holds a quantity; InputError without one."""
     scene, problem = bound.scene, bound.scene.problem
     if reason := without_interval(scene.reduction, quantity):
         raise InputError(reason)
@@ -104,7 +101,7 @@ def interval(bound: Bound, quantity: Quantity) -> tuple[float, float]:
         value = bound.size(bound.strained) ** 2 / 2 + unknown
     rho = float(np.sqrt(gap_of_stress**2 / 4 + works / 2))
     limit, found = HUGE, []
-    for _ in range(TRIED):
+    for _ in range(3):  # adjoints of a quantity, each with what the one before tells
         own = _adjoint(bound, omega, duals, limit)
         tractions = scene.balanced(own.tractions, motions)
         c = max(own.constant, _least_constant(scene, tractions))
@@ -172,9 +169,7 @@ def _adjoint(bound: Bound, omega: np.ndarray, duals: Duals, limit: float) -> _Ad
 def _with_slip(
     bound: Bound, pair: FacingFacets, z: list[np.ndarray], omega: np.ndarray, limit: float
 ) -> tuple[np.ndarray, float]:
-    """Make y_t vanish where the surfaces of a pair stick, and stay below `limit` times the slip.
-    Returns the direction e (f, 1) of each facet, zero where y_t is zero, and c.
-    """
+    """Make y_t vanish in stick and stay below `limit` times the slip; returns e (f, 1) and c."""
     side = pair.sides[0]
     slip = pair.jump(bound.displacement, pair.nodes)[1]
     within = pair.jump(bound.displacement, pair.rule)[1]
@@ -227,9 +222,7 @@ def _with_gap(
     limit: float,
     turned: np.ndarray,
 ) -> float:
-    """Make y_n - mu e y_t, where mu e is `turned`, vanish where the surfaces of a pair touch, and
-    stay below `limit` times the gap. Returns c.
-    """
+    """Make y_n - turned y_t vanish in contact and stay below `limit` times the gap; returns c."""
     d = bound.scene.problem.dim
     nodes = facet_nodes(d)
     weights = [pair.at_points(own, pair.nodes) for own in omega.T[:2]]

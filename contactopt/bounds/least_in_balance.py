@@ -1,7 +1,5 @@
 """A quadratic form made least under linear equations, by an augmented Lagrangian."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
@@ -10,8 +8,6 @@ from contactopt.errors import InputError
 
 SOFT = 1e-12  # of the scaled form: equations leave nothing free
 STIFF = 1e6  # of the equations, in the same scale
-BALANCED = 1e-11  # of the largest share in an equation, so much may be missing
-CORRECTIONS = 20  # of the multipliers, at most
 
 
 class LeastInBalance:
@@ -39,12 +35,12 @@ class LeastInBalance:
         K, C, slope, values = self._K, self._C, self._scale * slope, self._size * values
         x, multipliers, missed = np.zeros(len(slope)), np.zeros(len(values)), -values
         found = np.inf
-        for number in range(CORRECTIONS):
+        for number in range(20):  # of the multipliers, at most
             x -= self._factors.solve(K @ x + slope + C.T @ (multipliers + STIFF * missed))
             missed = C @ x - values
             multipliers += STIFF * missed
             largest = float((abs(C) @ np.abs(x)).max(initial=0.0)) or 1.0
             found = float(np.abs(missed).max(initial=0.0)) / largest
-            if number and found < BALANCED:
+            if number and found < 1e-11:  # of the largest share in an equation
                 break
         return self._scale * x, found

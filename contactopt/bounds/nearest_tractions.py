@@ -15,8 +15,8 @@ Any moments m become those of elements in balance in three steps, written P m:
 1. T is formed from the forces h of m by the formula for balanced ones.
 2. T - C e(w) is in weak equilibrium, if w is the displacement of the body under the forces
    int T : e(phi). This takes one solve with the factors of the body.
-3. Of all changes of m that leave the forces V (T - C e(w)) grad phi_a, the smallest is taken. It is
-   found vertex by vertex (contactopt.bounds.vertex_balance).
+3. The smallest change of m that leaves the forces V (T - C e(w)) grad phi_a is taken. It is found
+   vertex by vertex (contactopt.bounds.vertex_balance).
 
 The energy of the stress is minimised over balanced moments by conjugate gradients, preconditioned
 by P D^-1 P' with the diagonal D of its second derivative, averaged over the components. An L2 norm
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from contactopt.bounds.tetrahedra import Tetrahedra
 
 
-GAIN = 0.05  # of the energy: a step that makes it less by a smaller share is the last one
 STEPS = 30  # at most
 
 
@@ -71,7 +70,7 @@ class Energy(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BalancedMoments:
-    """The map P of the head of this module, and its transpose, for the elements of a body."""
+    """The map P defined at the top, and its transpose, for the elements of a body."""
 
     cells: Tetrahedra
     material: Material
@@ -99,9 +98,7 @@ class BalancedMoments:
         return self._slopes.T.tocsr()
 
     def _strains(self, F: np.ndarray) -> np.ndarray:
-        """The mean strains (e, dim, dim) of the body under the forces of stresses, which are F (e,
-        dim, dim) over the volume.
-        """
+        """The mean strains (e, dim, dim) under forces of the stresses F over the volume."""
         d = self.cells.dim
         w = self.answer.moved((self._back @ F.reshape(-1, d)).T)
         return _symmetric((self._slopes @ w.T).reshape(-1, d, d))
@@ -160,7 +157,7 @@ class BalancedMoments:
             step = size / float(np.sum(way * turned))
             m, left = m + step * way, left - step * turned
             twice -= step * size
-            if step * size < GAIN * twice:
+            if step * size < 0.05 * twice:  # the last step gains less of the energy
                 break
         return m
 

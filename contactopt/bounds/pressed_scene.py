@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from contactopt.bodies.protocol import Body
 
 THIN = 3e4  # length over height: half as much again is past what rounding permits
-CLEAR = 1.5  # of the bubbles that a facet beside the pressure needs, so that it stays open
 
 
 class PressedScene:
@@ -109,14 +108,17 @@ class PressedScene:
         longest = np.sum(edges**2, axis=0)[made.opposite].max(axis=0)
         if np.any(longest > THIN * 2 * made.volume):
             raise InputError(
-                f"{name}: of elements {THIN:g} times as long as high rounding leaves no bound; make"
-                " the mesh less steeply graded."
+                f"{name}: where elements are {THIN:g} times as long as high, rounding leaves no"
+                " bound; make the mesh less steeply graded."
             )
         part: Any = self.reduction.scene.parts[number]
         holding = [own for own in part.supports if "z" in (own.displacement or ("z",))]
         plates = [own for own in part.loads if own.level]
         if self.revolved and plates and len(holding) + len(plates) > 1:
-            raise InputError(f"{name}: a bound needs nothing else that holds it beside the plate.")
+            raise InputError(
+                f"{name}: no bound is known if a plate and a second plate or support hold it along"
+                " the axis; let the plate alone hold it."
+            )
         heavy = any(not own.boundary and own.value[1] for own in part.loads)
         order = 2 if self.revolved and heavy else degree
         return EquilibriumElements(mesh, order, self.revolved, halves.corners)
@@ -186,9 +188,7 @@ class PressedScene:
         return ForceResponse(body.body.degree, moved)
 
     def balanced(self, t: np.ndarray, resultants: np.ndarray) -> np.ndarray:
-        """Tractions (k, dim) that balance resultants (p,) in the free motions, each scaled by what
-        it does there.
-        """
+        """Tractions (k, dim), scaled to balance the resultants (p,) of free motions."""
         bodies = zip(self.bodies, self.loads)
         work = np.concatenate([load.T @ body.motions.fields for body, load in bodies], axis=1)
         if not work.shape[1]:
@@ -203,9 +203,7 @@ class PressedScene:
         return t * (1 + change)[:, None]
 
     def admissible(self, nodal: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """The displacements with what keeps the gap from being negative, and closes it where there
-        is pressure: hat functions at vertices and bubbles between them.
-        """
+        """The displacements, with hats and bubbles that keep the gap from being negative."""
         d = self.problem.dim
         nodes = facet_nodes(d)
         out = [own.copy() for own in nodal]
@@ -224,7 +222,7 @@ class PressedScene:
                 gap, bubble = control_points(gap, d), control_points(bubble, d)
             found = np.divide(-gap, bubble, out=np.zeros(gap.shape), where=bubble > CLOSE)
             np.maximum.at(more, points.facets[0], found.max(axis=1))
-            more[~closed.all(axis=1)] *= CLEAR
+            more[~closed.all(axis=1)] *= 1.5  # so that facets beside the pressure stay open
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))
         return out
 
@@ -245,9 +243,7 @@ class PressedScene:
         component: int = 0,
         change: bool = False,
     ) -> float:
-        """The work of a component of tractions, (k,), in the gap or the slip, or in what
-        displacements change of them.
-        """
+        """The work of tractions (k,) of a component in the gap or the slip, or in its change."""
         total = 0.0
         for pair in self.pairs:
             jump = pair.jump(nodal, pair.rule, change)[component]

@@ -9,8 +9,6 @@ elasticity problems, Numer. Math. 30, for k = 1; Gopalakrishnan, Guzman, Lee (20
 Johnson-Mercier elasticity element in any dimensions, for others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations
@@ -53,9 +51,7 @@ class SplitTriangle(NamedTuple):
 
 @cache
 def split_triangle(k: int, free: int | None = None) -> SplitTriangle:
-    """The stresses of degree k, 1 or 2; those that are zero along one edge where its tractions are
-    zero, if the vertex opposite this edge is given.
-    """
+    """The stresses of degree k; those without tractions on the edge opposite a given vertex."""
     parts, line = [_part(number, k) for number in range(3)], np.linspace(0, 1, k + 1)
     forwards = np.stack([1 - line, line, 0 * line])
     conditions = []

@@ -34,8 +34,6 @@ finite element methods for two-dimensional elasticity problems, Numer. Math. 30;
 Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -56,9 +54,7 @@ class Tetrahedra(Simplices):
     """Straight-edged tetrahedra, with displacements and stresses on them."""
 
     def stress(self, material: Material, nodal: np.ndarray) -> np.ndarray:
-        """The stress (e, dim + 1, dim, dim), at the vertices of each element between which it is
-        linear, of a displacement of vertices and edges.
-        """
+        """The stress (e, dim + 1, dim, dim) at vertices, of displacements of vertices and edges."""
         lam, shear = lame(material)
         d, t, G = self.dim, self.mesh.t, self.slopes
         ends, edges = self.between
@@ -111,9 +107,7 @@ class Tetrahedra(Simplices):
         return np.array(found)
 
     def form(self, material: Material, chosen: slice | np.ndarray) -> np.ndarray:
-        """(e, component, component) the energy of some elements by the integrals of the products of
-        the components of their stresses on the reference element.
-        """
+        """(e, component, component) the energy by integrals of products of reference components."""
         d, (E, nu) = self.dim, (material.E, material.nu)
         pairs = components()
         base = np.zeros((len(pairs), d, d))
@@ -179,9 +173,7 @@ class Tetrahedra(Simplices):
 
     @cached_property
     def forces_of_moments(self) -> sp.csc_matrix:
-        """(e (dim + 1), facets dim) from the moments of one component of tractions to the forces at
-        the vertices of the elements.
-        """
+        """(e (dim + 1), facets dim) from moments to the forces at the vertices."""
         d, count = self.dim, len(self.volume)
         rows, columns, signs = [], [], []
         for o, own in enumerate(self.others):
@@ -197,8 +189,8 @@ class Tetrahedra(Simplices):
         return np.asarray(m[self.opposite[:, None], self.slots] * self.sign[:, None, :, None])
 
     def _energy(self, material: Material, missing: np.ndarray) -> Energy:
-        """Of the stress with the data `missing` by the moments of facets. Single precision does for
-        it, since it says how far the energy can fall but not whether the stress is in balance.
+        """The energy of the stress with the data `missing`, by the moments of facets. Single
+        precision is enough: it says how far the energy can fall, and nothing about balance.
         """
         d, count, stress = self.dim, self.mesh.facets.shape[1], reference_stress()
         inputs, back = (d + 1) * d * d, self.by_moments.T.tobsr((d, d))  # without the body force

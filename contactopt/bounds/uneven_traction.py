@@ -31,8 +31,8 @@ It is finite, by the inequalities of Korn and of traces. The bound is close wher
 nearly regular and larger for others.
 
 In a plane section nothing needs to be estimated: the element is
-cut into a fan of triangles whose outer edges lie between the bends. Of all stresses of composite
-elements on the fan, with d on these edges and none on the others, that of least energy is taken.
+cut into a fan of triangles whose outer edges lie between the bends. The stress is the one of least
+energy among those of composite elements on the fan, with d on these edges and none on the others.
 In bodies of revolution r s takes the place of s.
 """
 
@@ -161,9 +161,7 @@ def _by_fans(scene: PressedScene, pair: FacingFacets) -> np.ndarray:
 
 
 def _fans(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray) -> tuple[Any, np.ndarray]:
-    """A mesh of fans of triangles (e, 3, 2), numbered fan by fan, and the moments (facets, 2, 2) of
-    tractions (e, 2, 2) that are linear between the first two corners of each.
-    """
+    """A mesh of fans of triangles, and moments of tractions, linear on their first edges."""
     count = len(corners)
     follows = np.concatenate([[False], fan[1:] == fan[:-1]])
     number = np.zeros((3, count), dtype=int)

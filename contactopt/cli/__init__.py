@@ -4,8 +4,6 @@ Exit codes: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2
 be used, 130 interrupted.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -57,9 +55,7 @@ def _refused(why: str, code: int = 2) -> int:
 
 @contextmanager
 def _logging(verbose: int, quiet: bool) -> Iterator[None]:
-    """-v sends what the package logs to the standard error: once its steps, twice also their
-    details. -q leaves errors only.
-    """
+    """-v sends the package's steps to the standard error, twice details; -q leaves errors only."""
     logger = logging.getLogger("contactopt")
     before, handler = logger.level, logging.StreamHandler()
     handler.setFormatter(logging.Formatter("  %(name)s: %(message)s"))

@@ -48,9 +48,7 @@ def _changes(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve a scene, write its files and print its numbers. The exit code is 0 if it is solved, to
-    the accuracy asked for, else 1.
-    """
+    """Solve a scene, write its files and print its numbers. The exit code is 0 if it is solved."""
     from contactopt.run_options import OPTIONS
     from contactopt.runner import run
 
@@ -178,9 +176,7 @@ def check(options: argparse.Namespace) -> int:
 
 
 def export(options: argparse.Namespace) -> int:
-    """Write a scene for another code: a deck of CalculiX, its interface problem for FCLib, or its
-    matrices.
-    """
+    """Write a scene for another code: a deck of CalculiX, a file of FCLib, or its matrices."""
     from contactopt.files.writing import whole_file
     from contactopt.runner import scene_of
 

@@ -6,8 +6,6 @@ zsh:   contactopt completion zsh >> ~/.zshrc
 fish:  contactopt completion fish > ~/.config/fish/completions/contactopt.fish
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json
@@ -21,9 +19,7 @@ NAMES: dict[str, dict[str, str]] = json.loads(
 
 
 def table(room: str, name: str) -> dict[str, str]:
-    """The names in a table of a room, and what each is, read from the source without importing it:
-    rows are (module, name, what it is, ...).
-    """
+    """Names and descriptions in a table of a room, read from the source without importing it."""
     home = files("contactopt").joinpath(*room.split("."), "__init__.py")
     for node in ast.parse(home.read_text("utf-8")).body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]

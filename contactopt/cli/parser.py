@@ -1,7 +1,5 @@
 """The parser of the command line, made of command_line.toml and of the options of a run."""
 
-from __future__ import annotations
-
 import argparse
 import tomllib
 from collections.abc import Callable, Mapping
@@ -17,9 +15,7 @@ OF_A_SCENE = ("run", "show", "check", "simplify", "export", "limit")
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The parser of the command line, with all commands and options; the attribute `command` of
-    what it reads names the function to execute.
-    """
+    """The parser of the command line; its result's `command` names the function to execute."""
     texts = tomllib.loads(files("contactopt.cli").joinpath("command_line.toml").read_text("utf-8"))
     texts["commands"]["bench"]["epilog"] = help_text()
     plain = argparse.RawDescriptionHelpFormatter

@@ -12,9 +12,7 @@ __all__ = ["Fields", "recover"]
 
 
 def recover(reduction: Reduction, solution: Solution) -> tuple[Fields, ...]:
-    """The displacement and stress of each body that has any, upper body first, from a reduction and
-    a solution of its problem.
-    """
+    """The displacement and stress of each body that has any, from a solution of a reduction."""
     displaced = zip(reduction.bodies, reduction.displaced(solution))
     found = each(lambda pair: fields_of(*pair), displaced)
     return tuple(own for own in found if own is not None)

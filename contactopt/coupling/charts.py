@@ -131,7 +131,7 @@ def _axes(contacts: ContactPoints, planes: list[SymmetryPlane]) -> tuple[np.ndar
 
 
 def _mean_normal(contacts: ContactPoints) -> np.ndarray:
-    """Of the surface, or, where it closes on itself, that of the plane that fits it best."""
+    """The mean normal of a surface; that of the plane that fits best, if it closes on itself."""
     mean = contacts.normals @ contacts.areas / contacts.areas.sum()
     size = float(np.linalg.norm(mean))
     if size > FLAT:
@@ -142,9 +142,7 @@ def _mean_normal(contacts: ContactPoints) -> np.ndarray:
 
 
 def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
-    """The first direction of a surface without planes of symmetry, in the sense in which the areas
-    or else the first contact reach further.
-    """
+    """The first direction of a surface without symmetry, where areas or a contact reach further."""
     points, areas = contacts.points, contacts.areas
     centred = points - (points @ areas / areas.sum())[:, None]
     centred = centred - np.outer(n, n @ centred)

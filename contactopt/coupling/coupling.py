@@ -142,9 +142,7 @@ def couple(
 
 
 def tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, AssembledBody]) -> Coupling:
-    """The contract of every coupling: a constant pressure gives both sides their consistent nodal
-    forces. Where it does not, `fails` says so.
-    """
+    """Every coupling's contract: constant pressure gives consistent nodal forces, or it `fails`."""
     surfaces = tuple(
         body.surface(name) if body.meshed else None for body, name in zip(bodies, pair.surfaces)
     )

@@ -58,9 +58,7 @@ FLAT = 1e-6  # points are on one line within this fraction of their extent
 def independent(
     pairs: Sequence[Contact], couplings: Sequence[Coupling], bodies: Iterable[AssembledBody]
 ) -> tuple[Coupling, ...]:
-    """The couplings of pairs of surfaces of bodies, of which ties gave up contacts at cross-points,
-    or know which they could not.
-    """
+    """The couplings of pairs, where ties gave up contacts at cross-points, or could not."""
     tied = [number for number, pair in enumerate(pairs) if pair.law == "tied"]
     if not tied:
         return tuple(couplings)
@@ -170,9 +168,7 @@ class _Seam:
         return found
 
     def holds(self, kept: np.ndarray) -> bool:
-        """Whether some contacts hold a body as well as all do: as many directions are between
-        them.
-        """
+        """Whether some contacts hold a body in as many directions as all do."""
 
         def directions(some: np.ndarray) -> int:
             points = self.made.positions[:, some]
@@ -195,9 +191,7 @@ def _mainly(moved: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def _known_already(ties: Sequence[_Seam]) -> dict[int, np.ndarray]:
-    """By the number of each tie with matching nodes, those of its contacts whose nodes ties before
-    it, or contacts before them, make one node.
-    """
+    """By tie with matching nodes, the contacts that ties or contacts before it make one."""
     ends: list[tuple[int, int, tuple[_Node, _Node]]] = []
     for tie in ties:
         (upper, first), (lower, second) = zip(tie.pair.bodies, map(_first, tie.main))
@@ -269,9 +263,7 @@ def _joined_elsewhere(
 def _reached(
     start: Mapping[str, np.ndarray], pieces: Sequence[tuple[_Seam, np.ndarray]]
 ) -> dict[str, np.ndarray]:
-    """The unknowns of each body that pieces of surfaces join to some unknowns to start with; each
-    piece is passed once in each direction.
-    """
+    """The unknowns of each body that pieces of surfaces join to some unknowns to start with."""
     reached, new = dict(start), True
     ways = [(seam, rows, here) for seam, rows in pieces for here in (0, 1)]
     while new:

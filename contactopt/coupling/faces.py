@@ -178,9 +178,7 @@ def _along(axes: np.ndarray, number: int, vectors: np.ndarray) -> np.ndarray:
 
 
 def _solve(A: list[list[np.ndarray]], b: list[np.ndarray]) -> np.ndarray:
-    """Solutions (n, m) of m systems of one or two equations, with entries A[row][column] (m,); far
-    away where there is none, because a face is seen from its edge.
-    """
+    """Solutions (n, m) of m systems A[row][column] of one or two equations; far if singular."""
     if len(b) == 1:
         over, divisor = np.stack(b), A[0][0]
     else:
@@ -208,9 +206,7 @@ def faces_of(
     points: np.ndarray,
     curve: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Faces:
-    """The surface of faces with `nodes` (f, j) and normals like `outward` (dim, f); the rest as in
-    Faces.
-    """
+    """The surface of faces with `nodes` (f, j) and normals like `outward` (dim, f)."""
     made = Faces(name, kind, degree, points, nodes, np.ones(len(nodes)), weight, curve)
     return replace(made, turn=np.sign(np.sum(face_normals(made) * outward, axis=0)))
 

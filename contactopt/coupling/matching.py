@@ -78,9 +78,7 @@ def couple_nodes(
 
 
 def _conforming(cells: np.ndarray, others: np.ndarray, partner: np.ndarray) -> bool:
-    """Whether all cells (v, c) of a surface have the partners of their corners at the corners of
-    one of the cells of the other surface.
-    """
+    """Whether the cells (v, c) have partners at the corners of a cell of the other surface."""
     if len(cells) != len(others):
         return False
     known = np.unique(np.sort(others, axis=0), axis=1)
@@ -172,9 +170,7 @@ def _match(upper: Surface, lower: Surface) -> np.ndarray:
 
 
 def _turn(surface: Surface) -> np.ndarray:
-    """(k,) twice the largest difference between the normal at a contact and those next to it: a
-    bound on the error of normals, which are means over facets.
-    """
+    """(k,) twice the largest difference between neighbours' normals, which bounds their error."""
     turn = turns(surface.normals, surface.cells)
     return np.where(turn > 1e-12, 2 * turn, 0.0)
 

@@ -1,6 +1,6 @@
 """The matrices of a reduced scene for other codes, as arrays in one file or as Matrix Market files.
 
-Of every body with a stiffness, under its name:
+Every body with a stiffness has, under its name:
 
     K, f        stiffness (n, n) and loads (n,), before supports and plates
     N, g, p     the displacements that supports and plates leave: U = g + N v with the unknowns v
@@ -27,7 +27,7 @@ from contactopt.files.writing import whole_file, whole_folder
 
 
 def matrices_of(reduction: Reduction) -> dict[str, Any]:
-    """The arrays and sparse matrices of the head of this module, by names such as 'upper.K'."""
+    """The arrays and sparse matrices listed at the top, by names such as 'upper.K'."""
     problem = reduction.problem.explicit()
     found: dict[str, Any] = {name: getattr(problem, name) for name in ("Q", "q", "V", "s", "mu")}
     for body, B in zip(reduction.bodies, reduction.maps):
@@ -52,9 +52,7 @@ def matrices_of(reduction: Reduction) -> dict[str, Any]:
 
 
 def write_matrices(reduction: Reduction, path: Path, form: str) -> None:
-    """Write them as NumPy's npz, sparse matrices by their data, indices, indptr and shape, or into
-    a folder of Matrix Market files.
-    """
+    """Write them as NumPy's npz, or into a folder of Matrix Market files."""
     from scipy.io import mmwrite
 
     found = matrices_of(reduction)

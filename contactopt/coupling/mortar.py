@@ -279,9 +279,7 @@ def _alone(
     x: np.ndarray,
     normals: np.ndarray,
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-    """The own node of every contact, and the other side's shape functions on the normal through
-    its place x (dim, k).
-    """
+    """The own node of every contact, and the other side's shape functions on its normal."""
     k = len(nodes)
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
     # a point on the faces of the node itself: at a corner others are as near

@@ -48,9 +48,7 @@ def posed(
     Q: str = "auto",
     coupling: str | None = None,
 ) -> Posed:
-    """Assemble the bodies of a scene and couple their surfaces; the arguments are as for reduce(),
-    and so are the errors.
-    """
+    """Assemble the bodies of a scene and couple their surfaces, as reduce() does."""
     begin = time.perf_counter()
     elements, zone = _checked(scene, elements, zone, Q)
     assembled = tuple(each(lambda part: assemble(scene, part, elements, zone), scene.parts))
@@ -146,9 +144,7 @@ def free_problem(scene: Scene, made: Posed) -> InterfaceProblem:
 
 
 def _free_body(scene: Scene, assembled: AssembledElastic) -> Any:
-    """The rigid motions (n, m) of an elastic body that leave supports at rest and plates level, and
-    the resultants (m,) of its loads in them.
-    """
+    """The rigid motions (n, m) that supports and level plates leave, and resultants (m,) there."""
     body = assembled.body
     R, labels = whole_motions(scene.analysis, body.basis)
     mean = body.motion.T / np.maximum(body.motion.sum(axis=0), 1.0)[:, None]

@@ -139,9 +139,7 @@ class Reduction:
         return tuple(np.split(multipliers, ends[:-1]))
 
     def displaced(self, solution: Solution) -> tuple[np.ndarray, ...]:
-        """The displacements U (n_b,) of each body [length], computed once for each solution. Bodies
-        whose displacements came with the contact forces are not solved at all.
-        """
+        """The displacements U (n_b,) of each body [length], computed once per solution."""
         if solution in self._known:
             return self._known[solution]
         given = [] if solution.displacements is None else list(solution.displacements.parts)
@@ -210,9 +208,7 @@ class Reduction:
         return replace(made, slipped=0.0)
 
     def after(self, slipped: np.ndarray) -> Reduction:
-        """The step of a load path that follows a state: slip is measured from the tangential
-        displacements (k, dim - 1) of that state [length].
-        """
+        """The step of a path after a state: slip counts from its displacements (k, dim - 1)."""
         q = self.problem.q.copy()
         q[:, 1:] -= slipped
         return replace(self, problem=replace(self.problem, q=q), slipped=slipped)

@@ -13,8 +13,6 @@ The same factors are those of an LU factorisation of K', K' = P L U, which `Whol
 array. Then K x = b is solved by two triangular systems wherever the array is taken.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -32,7 +30,6 @@ from contactopt.linear.operators import asymmetry
 from contactopt.methods.kernels.bonded import LEAST_PIVOT
 
 SINGULAR = 1e-13  # reciprocal condition of a matrix below which it counts as singular
-DOUBT = 1e-6  # least pivot, over the largest, below which the condition is looked at
 UNSEEN = 1e-8  # relative residual up to which a singular system counts as solved
 UNIQUE = (
     "the solution has no derivative, because its linear system is singular: forces or motions are"
@@ -79,7 +76,7 @@ class Square:
             return
         self.lu, self.swaps, _ = dgetrf(S.T, overwrite_a=True)
         pivots = np.abs(self.lu.diagonal())
-        if pivots.min() > DOUBT * pivots.max():
+        if pivots.min() > 1e-6 * pivots.max():  # else look at the condition
             return
         S = np.empty(S.shape)
         S[:, self.order] = (np.tril(self.lu, -1) @ np.triu(self.lu) + np.triu(self.lu)).T
@@ -121,7 +118,7 @@ class Square:
 
 @dataclass(frozen=True, eq=False)
 class DenseFactors:
-    """The factors of this module's head, for an array Q.
+    """The factors defined at the top, for an array Q.
 
     order    (m,) equations and unknowns of M in the order of K;  known  how many are known
     scales   (2, m) diagonals of R and C in the order of M
@@ -228,9 +225,7 @@ def dense_factors(Q: np.ndarray, V: np.ndarray, rho: np.ndarray, D: np.ndarray) 
 
 
 def _sticking(Q: np.ndarray, kept: np.ndarray, stick: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The components (n,) that Cholesky's factor serves, and this factor: `stick`, or none if the
-    `kept` ones are few, or Q is not symmetric and safely positive definite.
-    """
+    """The components (n,) that Cholesky's factor serves, and this factor, or none of few ones."""
     none = np.zeros(len(Q), dtype=bool), np.zeros((0, 0))
     if np.count_nonzero(kept) <= WHOLE or not stick.any():
         return none

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 CERTIFIED = 1e-5  # largest certificate of a solution whose derivative means anything
 NEAR = 1e-6  # distance to a kink, over the largest force, within which a contact is weakly active
-ROUNDING = 100  # and this many times the certificate, if that is more
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,9 +228,7 @@ class Sensitivity:
     def _step(
         self, error: np.ndarray, balance: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, Callable[[], np.ndarray]]:
-        """dr (k, dim), dlambda (p,) on the piece of P at which the solver ended, and what gives
-        Q dr + V dlambda (k, dim).
-        """
+        """dr (k, dim), dlambda (p,) on the solver's last piece, and Q dr + V dlambda (k, dim)."""
         dr, dlam, moved = self.tangent.solve(error.ravel(), balance)
         V = self.problem.V
         return dr.reshape(error.shape), dlam, lambda: (moved() + V @ dlam).reshape(error.shape)
@@ -293,7 +290,7 @@ def _moved(problem: InterfaceProblem, solution: Solution) -> Moved:
 
 def told_apart(residual: float) -> float:
     """The distance to a kink, over the largest force, below which a certificate tells no side."""
-    return max(NEAR, ROUNDING * residual)
+    return max(NEAR, 100 * residual)  # and this many times the certificate, if that is more
 
 
 def _given(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> np.ndarray:

@@ -39,8 +39,6 @@ from contactopt.methods.kernels.linearised import Linearised
 from contactopt.problem import InterfaceProblem, dimensionless
 from contactopt.problem.scaling import scales_of
 
-ROUNDS = 12  # of GMRES, which gain four digits each
-
 # error (k d,), balance (p,) -> dr and dlambda of these shapes, and what gives Q dr
 Solve = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, Callable[[], np.ndarray]]]
 
@@ -81,7 +79,7 @@ class Tangent:
 
     @cached_property
     def transposed(self) -> Tangent:
-        """The system for z and b of this module's head, for a symmetric Q."""
+        """The system for z and b defined at the top, for a symmetric Q."""
         return replace(self, D=self.D.transpose(0, 2, 1))
 
     @cached_property
@@ -180,7 +178,7 @@ def _by_products(problem: InterfaceProblem, linearised: Linearised, accuracy: fl
 
 
 def _with_bodies(problem: InterfaceProblem, linearised: Linearised, accuracy: float) -> Inner:
-    """With the equilibrium of the bodies beside the contacts, without products with Q."""
+    """With the equilibrium of the bodies and that of the contacts, without products with Q."""
     form = problem.Q.coupled
     P = fitted(model_of(problem, deflate=False), form, problem.V)
     coupled, none = Coupled(linearised.equations, form, P), form.pulled(np.zeros(problem.q.size))
@@ -203,12 +201,10 @@ def _refined(
     weights: Stacked | float,
     accuracy: float,
 ) -> Stacked:
-    """Solve A x = b by `solve` again and again for what is left, until |W (b - A x)| / |W b| is
-    small enough; InputError if it is not, because the solution is not unique.
-    """
+    """Solve A x = b by repeated `solve` to |W (b - A x)| / |W b|; InputError if not unique."""
     x, rest = 0.0 * right, right
     size = last = norm(weights * right)
-    for _ in range(ROUNDS):
+    for _ in range(12):  # of GMRES, which gain four digits each
         if last <= accuracy * size:
             return x
         x = x + solve(rest, max(ROUND, 0.5 * accuracy * size / last))

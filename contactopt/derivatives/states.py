@@ -144,7 +144,7 @@ class Step(State):
 
 @dataclass(frozen=True, eq=False)
 class Duals:
-    """The gradient with respect to a state's data taken to the bodies: G, s* and W of the head."""
+    """The gradient with respect to a state's data on the bodies: G, s* and W as defined above."""
 
     state: State
     dual: Dual
@@ -242,9 +242,7 @@ def along(seeds: Seeds, moved: Moved, direction: Direction) -> float:
 
 
 def chain_of(result: object, distance: float | None = None) -> Chain:
-    """The solved states of a result, to differentiate through. InputError for a result without a
-    solved scene, and for a state that is not certified.
-    """
+    """The solved states of a result, to differentiate through; InputError if not certified."""
     path = result if isinstance(result, PathResult) else getattr(result, "path", None)
     if path is None:
         reduction, solution = getattr(result, "reduction", None), getattr(result, "solution", None)

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 MAGIC = b"\x89HDF\r\n\x1a\n"  # the first bytes of an HDF5 file
 # bytes that need not be in the file, and how much smaller compression can make others
 SMALL, PACKED = 2**20, 2000
-RIGID = 60  # largest block of M that is inverted on its own
 COLUMNS = 256  # of H solved for at a time
 
 
@@ -54,9 +53,7 @@ def read_hdf5(path: Path) -> InterfaceProblem:
 
 
 def _item(group: h5py.Group, name: str) -> Any:
-    """The group or data set of that path; InputError if it lies in another file or is larger than
-    what is stored of it.
-    """
+    """The group or data set of a path; InputError if it lies elsewhere or is not stored whole."""
     h5py = _h5py()
     for part in name.split("/"):
         if isinstance(group.get(part, getlink=True), h5py.ExternalLink):
@@ -149,7 +146,7 @@ def _solved(M: sp.csr_array, X: sp.csr_array) -> sp.csr_array:
     factors, n = splu(sp.csc_array(M)), M.shape[0]
     count, body = connected_components(M, directed=False)
     sizes = np.bincount(body, minlength=count)
-    if sizes.max(initial=0) <= RIGID:
+    if sizes.max(initial=0) <= 60:  # largest block of M that is inverted on its own
         order, place = np.argsort(body, kind="stable"), np.zeros(n, dtype=int)
         place[order] = np.arange(n) - np.repeat(np.cumsum(sizes) - sizes, sizes)
         own = sp.csr_array((np.ones(n), (np.arange(n), body)), shape=(n, count))

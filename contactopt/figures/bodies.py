@@ -42,9 +42,7 @@ def deformed(
     ax: Axes | None = None,
     couplings: Sequence[Coupling] = (),
 ) -> Any:
-    """Draw the deformed bodies, coloured by von Mises stress and mirrored to the whole section.
-    With the couplings what touches is drawn touching, whatever gap or overlap it had.
-    """
+    """Draw deformed bodies, coloured by von Mises stress and mirrored; contacts are closed."""
     size = _reach(scene, fields) or max(float(np.ptp(f.mesh.p, axis=1).max()) for f in fields)
     largest = max(float(np.abs(f.displacement).max()) for f in fields)
     gaps = [own.gap for own in couplings] or [problem.q[:, 0] - problem.q[:, 0].mean()]
@@ -83,9 +81,7 @@ def _closed(
 
 
 def _mirror_plane(scene: Scene, problem: InterfaceProblem) -> tuple[int, float] | None:
-    """The coordinate axis and the place on it [length] beyond which a section is mirrored: its axis
-    of revolution, or the plane of symmetry at the origin of its chart; None if whole.
-    """
+    """The axis and place [length] beyond which a section is mirrored; None if whole."""
     if scene.analysis.revolved:
         return 0, 0.0
     chart, x = problem.chart, problem.coordinates

@@ -36,9 +36,7 @@ NORMALS, SYMBOLS = 12, 5  # arrows on a contact surface and symbols on a boundar
 
 
 def write_check_page(check: SceneCheck, file: str | Path) -> Path:
-    """Write what is known of a scene before it is solved as a page, to a file that ends in .html.
-    InputError if the file cannot be written.
-    """
+    """Write what is known of a scene before it is solved to an .html file."""
     scene = check.scene
     elastic = [body for body in check.posed.bodies if isinstance(body, AssembledElastic)]
     meshes = {body.name: body.body.basis.mesh for body in elastic}
@@ -61,9 +59,7 @@ def write_check_page(check: SceneCheck, file: str | Path) -> Path:
 def write_mesh_page(
     name: str, meshes: Mapping[str, Any], text: str, notes: Sequence[str], file: str | Path
 ) -> Path:
-    """Write the bodies of a mesh file with their boundaries, and words about them, as a page.
-    InputError if the file cannot be written.
-    """
+    """Write the bodies of a mesh file with their boundaries, and words about them, as a page."""
     dim = len(next(iter(meshes.values())).p)
     own: Any = SimpleNamespace(
         name=name, units=("length", "stress"), dim=dim, analysis=KINDS["solid"]
@@ -91,9 +87,7 @@ def _write(
     words: tuple[str, str, Sequence[str]],
     file: str | Path,
 ) -> Path:
-    """The page of bodies, the meshes by name, of pairs and boundaries with their roles, and of
-    words: a sentence, a text and notes.
-    """
+    """The page of bodies (meshes by name), pairs, boundaries with their roles, and words."""
     pairs, items = shown
     what = "what it is for" if roles is ROLES else "boundary"
     units = [*scene.units, force_unit(scene.units)]
@@ -138,9 +132,7 @@ def _write(
 
 
 def _rows(lines: Sequence[str]) -> str:
-    """HTML of the lines of a text: a row for each line 'name: words' with those below it that are
-    indented; pairs of surfaces first.
-    """
+    """HTML of a text: a row for each line 'name: words' with indented ones below; pairs first."""
     rows: list[list[str]] = []
     for text in lines:
         if text.startswith(" ") and rows:
@@ -192,9 +184,7 @@ def _pair(pair: Contact, made: Coupling, many: int) -> dict[str, Any]:
 
 
 def _spread(places: np.ndarray, many: int) -> np.ndarray:
-    """Which (k,) of some places are marked: as many at most, each as far as can be from those
-    before it; the first is nearest to the middle.
-    """
+    """Which (k,) of the marked places, so many at most, lie far apart; a middle one first."""
     marked = np.zeros(len(places), dtype=bool)
     far = -np.linalg.norm(places - places.mean(axis=0), axis=1)
     for _ in range(min(many, len(places))):

@@ -30,8 +30,6 @@ POLICY = (
 )
 KINDS = {"f": ("f4", "<f4"), "i": ("i4", "<i4"), "u": ("i4", "<i4"), "b": ("i4", "<i4")}
 
-SHORT = 65535  # the largest number of two bytes
-
 
 def packed(array: ArrayLike) -> dict[str, Any]:
     """Numbers or truth values for the data of a page, of four bytes each."""
@@ -43,7 +41,7 @@ def packed(array: ArrayLike) -> dict[str, Any]:
 def packed_short(array: np.ndarray) -> dict[str, Any]:
     """Numbers for the data of a page, of two bytes each: their range in 65535 steps."""
     low, high = float(array.min(initial=np.inf)), float(array.max(initial=-np.inf))
-    step = (high - low) / SHORT if high > low else 1.0
+    step = (high - low) / 65535 if high > low else 1.0  # the largest number of two bytes
     text = _text(np.rint((array - low) / step).astype("<u2"))
     return {"type": "u2", "shape": list(array.shape), "low": low, "step": step, "data": text}
 
@@ -59,9 +57,7 @@ def write_html(
     data: Mapping[str, Any],
     programs: Sequence[str],
 ) -> Path:
-    """Write a page that stands alone: a header with its title, `body` (HTML, names escaped), and
-    programs in contactopt/figures/pages, which read `data`. InputError if it cannot.
-    """
+    """Write a page that stands alone: title, `body` and programs of pages/ that read `data`."""
     texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}
     encoded = _squeezed(json.dumps(data, allow_nan=False))
     parts = [
@@ -87,9 +83,7 @@ def _squeezed(text: str) -> str:
 
 
 def filled(name: str, **texts: str) -> str:
-    """Fill a template of HTML in contactopt/figures/pages. In place of $NAME stands the HTML given
-    for NAME, with every name in it escaped.
-    """
+    """Fill $NAME in a template of figures/pages with HTML."""
     return Template(_page_file(name)).substitute(texts)
 
 

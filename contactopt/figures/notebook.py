@@ -2,8 +2,6 @@
 which is made only when it is shown.
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import io
@@ -20,7 +18,6 @@ from contactopt.problem import alone
 from contactopt.scenes.scene import Scene
 
 HEIGHT = 520  # of the page of a scene [pixels]
-DOTS = 120  # per inch of a picture
 
 
 def result_card(result: Outcome) -> str:
@@ -32,9 +29,7 @@ def result_card(result: Outcome) -> str:
 
 
 def _pressure(result: Outcome) -> str:
-    """The pressure of the pair of surfaces where it is largest, as HTML with the picture inside;
-    empty where no figure can show it.
-    """
+    """The largest pressure's pair of surfaces as HTML with a picture; empty without a figure."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from contactopt.figures.plots import pressure
@@ -45,7 +40,7 @@ def _pressure(result: Outcome) -> str:
     largest = [result.pressure[pair.contacts].max(initial=0.0) for pair in problem.pairs]
     pair = problem.pairs[int(np.argmax(largest))]
     figure = pressure(result.scene, *alone(problem, result.shown, pair)).figure
-    figure.dpi, file = DOTS, io.BytesIO()
+    figure.dpi, file = 120, io.BytesIO()  # per inch of a picture
     FigureCanvasAgg(figure).print_png(file)
     name = html.escape(f"pressure of {pair.name}")
     data = base64.b64encode(file.getvalue()).decode()
@@ -53,9 +48,7 @@ def _pressure(result: Outcome) -> str:
 
 
 def scene_page(scene: Scene) -> str:
-    """The page of `contactopt check` of a scene, in a frame of a notebook; in its place what is
-    wrong with a scene that cannot be solved.
-    """
+    """The page of `contactopt check` in a frame of a notebook, or what is wrong with the scene."""
     from contactopt.figures.check_page import write_check_page
     from contactopt.figures.scene_check import check_scene
 

@@ -76,9 +76,7 @@ def draw(result: Outcome, folder: Path, formats: Sequence[str]) -> None:
 
 
 def write(result: Outcome, folder: Path) -> None:
-    """Write the fields of a result as VTU files, its contacts and states as tables, and its contact
-    forces and load path as arrays, into a folder.
-    """
+    """Write fields (VTU), contacts and states (tables), forces and load path into a folder."""
     surfaces = contact_fields(result.reduction, result.shown)
     for fields in on_nodes(result.reduction, result.fields, surfaces):
         fields.write_vtu(folder / f"{fields.name}.vtu")
@@ -126,9 +124,7 @@ def not_drawable(result: Outcome) -> str:
 
 
 def write_tables(result: Outcome, surfaces: Sequence[ContactFields], folder: Path) -> None:
-    """Write contact-PAIR.csv for every pair, one row per contact and state (the last state alone
-    where that is more than MOST_NUMBERS), units in the head.
-    """
+    """Write contact-PAIR.csv, one row per contact and state (the last alone if these are many)."""
     scene, problem, states = result.scene, result.problem, [surfaces]
     if result.path is not None and problem.contacts * len(result.path.states) <= MOST_NUMBERS:
         steps = range(len(result.path.states))
@@ -144,9 +140,7 @@ def write_tables(result: Outcome, surfaces: Sequence[ContactFields], folder: Pat
 
 
 def write_series(path: PathResult, last: tuple[Fields, ...], folder: Path) -> None:
-    """Write the bodies and surfaces at every state as VTU files, and states.pvd, which ParaView
-    plays; nothing where the path kept no displacements, or more than MOST_NUMBERS.
-    """
+    """Write all states as VTU files and states.pvd, unless the path kept none, or too many."""
     if not _fits(path, last):
         return
     lines = []

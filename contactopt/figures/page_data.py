@@ -2,8 +2,6 @@
 path, for the program in pages/view.js.
 """
 
-from __future__ import annotations
-
 import csv
 from contextlib import suppress
 from pathlib import Path
@@ -32,7 +30,6 @@ from contactopt.figures.style import highest_colour, magnification
 from contactopt.scenes.kinds import KINDS
 
 NEAREST = 16  # how many times as large as the picture of a contact the bodies may be
-TURNS = 0.5  # length of the mean of unit normals below which a surface goes around something
 # cosine of the angle between two faces from which on their edge is drawn
 SHARP = np.cos(np.deg2rad(30))
 # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut: such
@@ -227,9 +224,7 @@ def _apart(
 def _motion(
     bodies: dict[str, Any], fields: dict[str, dict[str, np.ndarray]], points: np.ndarray, dim: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Displacements (s, k, dim) of places (k, 3), from the nearest node, and what closes gaps
-    there (1, k, dim); none without bodies.
-    """
+    """Displacements (s, k, dim) of places (k, 3) from the nearest node, and what closes gaps."""
     if not bodies:
         return np.zeros((1, len(points), dim)), np.zeros((1, len(points), dim))
     nearest = KDTree(np.concatenate([mesh.points for mesh in bodies.values()])).query(points)[1]
@@ -247,9 +242,7 @@ def _contact(
     path: dict[str, np.ndarray] | None,
     own: slice,
 ) -> dict[str, Any]:
-    """One pair of surfaces: places, their motion, and values of every state; the mean normal where
-    the pressure is, if the surface does not go around something.
-    """
+    """One pair of surfaces: places, motion, values of every state, and the mean normal if flat."""
     (block,) = mesh.cells
     line = block.type == "line"
     flat = np.zeros((0, 3), dtype=int) if line else triangles(block.data)
@@ -264,7 +257,7 @@ def _contact(
         "lift": packed_short(motion[1]),
         "cells": packed(flat),
         "lines": packed(block.data if line else np.zeros((0, 2), dtype=int)),
-        "normal": (mean / size).tolist() if size > TURNS else None,
+        "normal": (mean / size).tolist() if size > 0.5 else None,  # not around something
         "peak": float(pressure.max(initial=0.0)),
         "place": packed(interface["x"][own].T),
         "states": {

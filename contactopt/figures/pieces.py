@@ -5,8 +5,6 @@ Elements are named, and their nodes numbered, as in meshio and VTU files. A face
 drawn as pieces between all of its nodes, and its edges as lines through the nodes in their middles.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.meshes.cells import mirrored
@@ -58,9 +56,7 @@ CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad9": 4}
 
 
 def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, np.ndarray]:
-    """The plane elements that a body shows, as their kind and nodes (m, v): itself in the plane; in
-    space its boundary, each face numbered as seen from outside.
-    """
+    """The plane elements that a body shows, as kind and nodes (m, v), seen from outside."""
     if kind not in FACES:
         return kind, elements
     faces = np.concatenate([elements[:, list(face)] for face in FACES[kind]])
@@ -106,9 +102,7 @@ def outline(kind: str, elements: np.ndarray) -> np.ndarray:
 
 
 def sharp_edges(kind: str, elements: np.ndarray, points: np.ndarray, cosine: float) -> np.ndarray:
-    """The edges of a closed surface of plane elements with places `points` (n, 3) where the normals
-    of both faces have a smaller cosine.
-    """
+    """The edges of a closed surface where the normals of both faces have a smaller cosine."""
     edges = _edges(kind, elements)
     normals = _normals(points[elements[:, : CORNERS[kind]]])
     normals /= np.linalg.norm(normals, axis=1)[:, None]

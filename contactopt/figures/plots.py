@@ -48,15 +48,11 @@ __all__ = [
 ]  # fmt: skip
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
-SMALL = 6.0  # parts of a contact line of which the contact zone fills one, if it is drawn alone
 COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels wide
-ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
-    """The contacts (j,) along the first direction of a surface, in order; in 3D of the row nearest
-    to its origin. A closed line is cut opposite to its origin.
-    """
+    """The contacts (j,) in order along a surface; in 3D of the row nearest to its origin."""
     x = problem.chart.places
     row = np.ones(x.shape[1], dtype=bool)
     if problem.dim == 3:
@@ -98,9 +94,7 @@ def _singular(scene: Scene) -> bool:
 def pressure(
     scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Axes | None = None
 ) -> Any:
-    """Contact pressure over its mean, with the exact curve, against position, over the half-width
-    where the zone lies about the origin.
-    """
+    """Contact pressure over its mean, with the exact curve, against position or position / a."""
     ax, (length, stress) = make_axes(ax), scene.units
     if not _in_rows(problem):
         values = solution.reactions[:, 0] / problem.areas
@@ -137,7 +131,7 @@ def _shown(
     """The limits of the places that are drawn: all, or those about a small zone that touches."""
     touching = place[contact_status(problem, solution.reactions).touching]
     extent = float(np.ptp(touching)) if len(touching) else 0.0
-    if extent == 0 or SMALL * extent > np.ptp(place):
+    if extent == 0 or 6.0 * extent > np.ptp(place):  # then the zone is drawn alone
         return None, None
     low, high = touching.min() - extent, touching.max() + extent
     return (
@@ -224,9 +218,7 @@ def _plane(scene: Scene, problem: InterfaceProblem, ax: Axes) -> None:
 def stick_map(
     scene: Scene, problem: InterfaceProblem, solution: Solution, ax: Axes | None = None
 ) -> Any:
-    """Sticking, slipping and open nodes of a 3D contact, with the tangential traction as arrows, of
-    which the longest is three times their distance.
-    """
+    """Sticking, slipping and open nodes in 3D, with the tangential traction as arrows."""
     ax = make_axes(ax)
     x, y = problem.chart.places
     status = contact_status(problem, solution.reactions)
@@ -245,7 +237,7 @@ def stick_map(
     add_legend(ax)
     _plane(scene, problem, ax)
     if largest > 0:
-        every = np.ceil(np.sqrt(status.touching.sum() / ARROWS))
+        every = np.ceil(np.sqrt(status.touching.sum() / 300))  # arrows can be told apart
         row = np.round(problem.chart.places / spacing) % every == 0
         shown = np.flatnonzero(status.touching & row.all(axis=0))
         look = {"angles": "xy", "scale_units": "xy", "scale": largest / (3 * spacing * every)}
@@ -256,9 +248,7 @@ def stick_map(
 
 
 def contact_figure(scene: Scene, problem: InterfaceProblem, solution: Solution) -> Any:
-    """Pressure above tangential traction of one pair, with the map of stick and slip in 3D. The
-    title has a status where the problem was not solved.
-    """
+    """Pressure above tangential traction of one pair, with the map of stick in 3D."""
     panels = [pressure, traction] + ([stick_map] if problem.dim == 3 else [])
     # Two plain panels have fixed places, because working out places takes as long as drawing.
     placed = problem.dim == 3
@@ -327,9 +317,7 @@ def convergence(solutions: dict[str, Solution], ax: Axes | None = None) -> Any:
 
 
 def refinement_figure(estimate: Estimate) -> Any:
-    """Over the unknowns of each mesh: estimated errors with the target, and the value with its
-    estimated error. The dotted line is the last value corrected.
-    """
+    """Estimated errors with the target, and the value, over the unknowns of each mesh."""
     from matplotlib.ticker import NullFormatter
 
     figure, (left, right) = paper_axes(2, wide=True)

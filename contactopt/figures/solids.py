@@ -17,17 +17,13 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
 LINE = 0.7  # half of the width of a mesh line [pixels]
-SPARSE = 6.0  # pixels, the least height of a triangle beside whose edges mesh lines are drawn
 DARK, DIM = 0.65, 0.82  # brightness of mesh lines and of faces seen along their plane
-TICKS = 6  # of an axis, at most
 EDGE = 1e-6  # pixels by which triangles are enlarged, so that nothing shows between them
 BLOCK = 1_000_000  # pixels of triangles that are looked at together
 
 
 def seen_from(elevation: float, azimuth: float) -> np.ndarray:
-    """The axes of a picture, unit vectors in the columns (3, 3): right, up, towards the eye; angles
-    [degrees] as in Matplotlib.
-    """
+    """The axes of a picture in columns (3, 3): right, up, towards the eye; angles in degrees."""
     e, a = np.radians(elevation), np.radians(azimuth)
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     right = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -53,7 +49,7 @@ def picture(
     share = _shares(placed[..., :2], own, columns + 0.5, rows + 0.5)
     shown = np.asarray(colours(np.einsum("pi,pi->p", share, values[own])))
     tall = _heights(placed[..., :2])
-    near = np.where(lined & (tall.min(axis=1) > SPARSE)[:, None], tall, np.inf)
+    near = np.where(lined & (tall.min(axis=1) > 6.0)[:, None], tall, np.inf)  # pixels of height
     # share of a corner up to which a pixel is near the edge opposite to it; nothing is near no edge
     near = LINE / near
     line = np.any(share < near[own], axis=1)
@@ -64,9 +60,7 @@ def picture(
 
 
 def nearest(corners: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """The triangle nearest to the eye at every pixel of an image of this shape, -1 without one;
-    `corners` (m, 3, 3) are places in pixels and distances towards the eye.
-    """
+    """The triangle nearest to the eye at every pixel or -1; `corners` (m, 3, 3) in pixels."""
     depth = np.full(shape[0] * shape[1], -np.inf)
     owner = np.full(shape[0] * shape[1], -1)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -150,9 +144,7 @@ def _light(corners: np.ndarray) -> np.ndarray:
 def draw_frame(
     ax: Axes, view: np.ndarray, low: np.ndarray, high: np.ndarray, labels: Sequence[str]
 ) -> None:
-    """Three edges of the box between `low` and `high` (3,) as axes with ticks and labels, those
-    that stand free of the bodies.
-    """
+    """Three edges of the box from `low` to `high`, free of the bodies, as axes with ticks."""
     from matplotlib.ticker import MaxNLocator
 
     letters = ax.xaxis.label.get_size()
@@ -160,7 +152,7 @@ def draw_frame(
     places = ((low, (5, -6), "left"), (low, (-5, -6), "right"), (left, (-5, 0), "right"))
     line = {"color": "black", "zorder": 3}
     lengths = (high - low) * np.linalg.norm(view[:, :2], axis=1)  # as drawn
-    ticks = np.maximum(1, np.round(TICKS * lengths / lengths.max())).astype(int)
+    ticks = np.maximum(1, np.round(6 * lengths / lengths.max())).astype(int)  # of an axis, at most
     for axis, (foot, shift, align) in enumerate(places):
         end = foot.copy()
         end[axis] = high[axis]

@@ -27,9 +27,6 @@ COLUMN, HEIGHT = 85 / 25.4, 62 / 25.4  # of a journal's column and of a row of a
 LETTERS, LINE, MARK = 7.0, 1.1, 3.2  # sizes [pt]
 FORMATS = ("png", "svg", "pdf")
 DPI = 200
-SHARE = 0.08  # of the bodies' size that the largest displacement is drawn as
-# of the largest displacement, by which the initial gap of a pair may vary and still be one distance
-APART = 1e-3
 # quantile of the von Mises stress where the colours end: singular corners would take them all
 TOP = 0.998
 
@@ -39,10 +36,10 @@ def magnification(size: float, displacement: float, gaps: Sequence[np.ndarray] =
     [length]; 1 where a gap varies, because a shape would be magnified.
     """
     varies = max((float(np.ptp(gap)) for gap in gaps if len(gap)), default=0.0)
-    if displacement == 0 or varies > APART * displacement:
+    if displacement == 0 or varies > 1e-3 * displacement:  # else it is one distance
         return 1.0
     largest = max([displacement, *(float(np.abs(gap).max(initial=0.0)) for gap in gaps)])
-    target = SHARE * size / largest
+    target = 0.08 * size / largest  # of the bodies' size that the largest displacement is drawn as
     if not 1.0 < target < np.inf:  # also where displacements are beyond all numbers
         return 1.0
     power = 10.0 ** np.floor(np.log10(target))
@@ -71,9 +68,7 @@ def paper_axes(
     height: float = HEIGHT,
     placed: bool = True,
 ) -> tuple[Any, np.ndarray]:
-    """A figure as wide as one column of a journal, or as two, and its axes, flat; `height` is that
-    of a row [inch]. Matplotlib finds the places of the axes if `placed`.
-    """
+    """A figure of one or two columns of a journal, and its flat axes; row `height` in inches."""
     from matplotlib.figure import Figure
 
     size = (COLUMN * (2 if wide else 1), height * rows)

@@ -8,8 +8,6 @@ the loop of force and displacement. The bodies move with it where the run wrote 
 which it does if they are small enough (MOST_NUMBERS in contactopt.figures.output).
 """
 
-from __future__ import annotations
-
 import html
 import io
 import json
@@ -37,9 +35,7 @@ WORDS = {
 
 
 def write_page(folder: str | Path, file: str | Path) -> Path:
-    """Write the page of a run, from the files that `contactopt run` wrote into its folder, to an
-    .html file. InputError if the folder is not that of a run.
-    """
+    """Write the page of a run from its folder; InputError if it is none."""
     folder = Path(folder)
     try:
         silent = io.StringIO()

@@ -17,7 +17,6 @@ from typing import Any
 from contactopt.checks import check_number, meant, short
 from contactopt.errors import InputError
 
-LARGEST = 10**300
 # what tomllib says of an entry or a table that is there twice
 TWICE = re.compile(r"Cannot (?:overwrite|declare|mutate|expand|redefine)|Duplicate")
 MOST_BYTES = 1_000_000  # bytes of a file that people write
@@ -79,9 +78,7 @@ class Table:
             raise self.fail(str(error), *below) from error
 
     def has(self, key: str, *kinds: type) -> bool:
-        """Say whether an entry is there, which close() takes as known from now on; it may be of any
-        of these types of KINDS.
-        """
+        """Say whether an entry of any of these KINDS is there, known to close() from now on."""
         self.known.append(key)
         return key in self.data
 
@@ -120,9 +117,7 @@ class Table:
         return value
 
     def numbers(self, key: str, count: int | None, what: str) -> list[float]:
-        """Take an array of finite numbers, which must be there; `count` of them, unless it is None.
-        A message calls them `what`.
-        """
+        """Take an array of `count` finite numbers, or any; a message calls them `what`."""
         values = self.take(key, list, needed=True, what=what)
         if count is not None and len(values) != count:
             raise self.fail(f"{key!r} must be {what}; got {short(values)}.", key)
@@ -207,9 +202,7 @@ def read_table(path: Path, what: str = "scene file") -> Table:
 
 
 def _again(said: str, text: str, line: int) -> str:
-    """The entry or table that is there a second time, by what tomllib says of it, or by the text
-    of its line.
-    """
+    """The entry or table that is there a second time, by tomllib's words or its line."""
     name = ".".join(re.findall(r"'([^']*)'", said))
     if said.startswith("Duplicate"):
         return repr(name)
@@ -224,7 +217,7 @@ def parse(text: str) -> dict[str, Any]:
     """
     try:
         data = tomllib.loads(text)
-        large = [value for value in _values(data) if type(value) is int and abs(value) > LARGEST]
+        large = [value for value in _values(data) if type(value) is int and abs(value) > 10**300]
     except tomllib.TOMLDecodeError:
         raise
     except ValueError:  # Python reads no number of more than 4300 digits

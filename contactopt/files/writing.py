@@ -4,8 +4,6 @@ written.
 Also pipes to other processes, which may be dead when one writes to them.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import shutil
@@ -54,7 +52,7 @@ def whole_folder(out: str | Path, stale: Iterable[str] = ()) -> Iterator[Path]:
     block ends without an error.
 
     After an error `out` holds what it held before, and a folder that was made for it is gone. Files
-    named in `stale` are removed from `out` unless the block wrote them anew. InputError where the
+    named in `stale` are removed from `out` unless the block wrote them again. InputError where the
     operating system refuses to write.
     """
     out = Path(out)
@@ -121,9 +119,7 @@ def _staging(folder: Path) -> Iterator[Path]:
 
 @contextmanager
 def _ctrl_c_waits() -> Iterator[None]:
-    """An interrupt within this block is heeded when the block ends, so that its steps are made all
-    or none. Only Python's main thread can be interrupted.
-    """
+    """An interrupt within this block is heeded when it ends, in Python's main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 
 
 def load_rows(scene: Scene) -> dict[str, tuple[float, bool]]:
-    """The loads of a scene by their names BODY:BOUNDARY:COMPONENT: the value, and whether it is a
-    total force.
-    """
+    """The loads of a scene by BODY:BOUNDARY:COMPONENT: value, and whether it is a total force."""
     found: dict[str, tuple[float, bool]] = {}
     for part in scene.parts:
         for load in getattr(part, "loads", ()):

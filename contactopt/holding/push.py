@@ -20,7 +20,6 @@ from contactopt.problem.scaling import scales_of
 GROWTH = 4.0  # of the prescribed motion from push to push
 EARLY = 6  # pushes that need not be solved while the motion is small
 SMALL = 0.1  # motion over the extent of the contacts, beyond which it is not small
-PUSHES = 20  # so that the last one is 1e12 times the first
 STEADY = 1e-5  # relative growth of the force below which it no longer grows
 ALIKE = 1e-3  # relative difference by which forces are a multiple of others, or two limits the same
 Note = Callable[[str], None]
@@ -28,7 +27,7 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class Push:
-    """The problem at f = 0, and g (k dim,), l (p,) and c of the head of contactopt.holding."""
+    """The problem at f = 0, and g (k dim,), l (p,) and c as in contactopt.holding."""
 
     problem: InterfaceProblem
     g: np.ndarray
@@ -54,9 +53,7 @@ class Push:
         return float(EQUAL * (1 + np.abs(self.problem.s).sum() / np.linalg.norm(self.load)))
 
     def end(self, largest: bool) -> float:
-        """An end of the interval of statics, infinite if it has none; not a number if it is
-        empty.
-        """
+        """An end of the interval of statics, infinite if it has none, nan if it is empty."""
         import cvxpy as cp
 
         from contactopt.models.static_limit import static_limit
@@ -80,9 +77,7 @@ class Push:
             return False
 
     def least(self, upper: float, note: Note) -> float:
-        """The least positive f with a solution, by halving below one that has it; minus infinity
-        if none is found.
-        """
+        """The least positive f with a solution, by halving one that has it; else -infinity."""
         first = (upper * share for share in (0.999, 0.9, 0.4))
         low, high = 0.0, next((f for f in first if self.rests(f)), 0.0)
         while high - low > ALIKE / 10 * high and high > self.nothing:
@@ -107,7 +102,7 @@ class Push:
         first = size * max(scales_of(own).length for own in (old, loaded))
         d, f, r, start, steepest, still = 0.0, np.nan, np.zeros(q.shape), None, 0.0, np.nan
         bound, at_first = SMALL * np.ptp(old.coordinates, axis=1).max(), None
-        for push in range(PUSHES):
+        for push in range(20):  # so that the last one is 1e12 times the first
             q_d = q + d * v.reshape(q.shape)
             step = q_d.copy()
             step[:, 1:] -= slipped

@@ -67,9 +67,7 @@ def _present() -> Budget:
 
 @contextmanager
 def open_budget(instead: NextBest | None = None) -> Iterator[None]:
-    """Count the work inside the block from zero on; without a limit where there is no other way,
-    until `fill` names one.
-    """
+    """Count the work inside the block from zero on, without a limit until `fill` names one."""
     token = _open.set(Budget(instead=instead))
     try:
         yield

@@ -1,7 +1,5 @@
 """Cores, memory, the threads of BLAS, and the one place where threads share work."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 from collections import deque
@@ -24,9 +22,7 @@ def cores() -> int:
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Let BLAS use one thread inside the block, for many small dense products between which others
-    would spin. It holds for the process: one thread alone may set it at a time.
-    """
+    """Let BLAS use one thread inside the block; one thread of the process alone may set it."""
     with threadpool_limits(1, user_api="blas"):
         yield
 
@@ -40,9 +36,7 @@ def give_back() -> None:
 def each(
     act: Callable[[Item], Result], items: Iterable[Item], parallel: Sequence[bool] | None = None
 ) -> tuple[Result, ...]:
-    """The results of a function for every item, in order; those that `parallel` marks (default:
-    all) at the same time, in threads. An exception of one item is raised here.
-    """
+    """The results of a function for every item, in order; `parallel` ones run at the same time."""
     listed = list(items)
     marked = [True] * len(listed) if parallel is None else list(parallel)
     if sum(marked) < 2:

@@ -25,16 +25,13 @@ from contactopt.linear.concurrency import cores
 from contactopt.linear.counter import Counter
 from contactopt.linear.operators import Form, InterfaceOperator, check_dense
 
-SINGLE = 2e-6  # accuracy of products from which on single precision serves
 LEVELS = 4  # halvings of the grid that its padding allows for
 LARGE = 2**16  # points from which on transforms use all processors
 Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
 
 
 def embedding(grid: tuple[int, ...]) -> tuple[int, ...]:
-    """The size M of the padded grid on which a convolution is transformed, along each axis: twice a
-    number that is at least that of the contacts and easy to halve and to transform.
-    """
+    """The size M, easy to transform, of the padded grid along each axis: twice that of the grid."""
     from scipy.fft import next_fast_len
 
     return tuple(
@@ -71,9 +68,7 @@ class Kernel:
 
     @classmethod
     def of_coefficients(cls, grid: tuple[int, ...], coefficients: Symbols) -> Kernel:
-        """Make a kernel from K_ab [length / force] at distances 0 to M / 2 along each axis, with M
-        as `embedding` gives it, for pairs of components a <= b.
-        """
+        """From K_ab [length / force], a <= b, at distances 0 to M / 2 along each axis."""
         from scipy.fft import dct, dst
 
         padded, symbols = embedding(grid), {}
@@ -199,9 +194,7 @@ class Kernel:
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
-    """Transform real values on a grid, padded by zeros to (M0[, M1]), in their precision, to (M0 /
-    2 + 1,) or (M0, M1 / 2 + 1); rows of padding are skipped.
-    """
+    """The transform of real values on a grid, padded by zeros to (M0[, M1]), in their precision."""
     from scipy.fft import fft, rfft
 
     workers = _workers_for(padded)
@@ -250,7 +243,7 @@ class Convolution(InterfaceOperator):
 
     def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
         every = tuple(range(self.kernel.dim))
-        single = accuracy is not None and accuracy >= SINGLE
+        single = accuracy is not None and accuracy >= 2e-6  # from which on it serves
         out = np.empty(X.shape)
         for column in range(X.shape[1]):
             parts = X[:, column].reshape(*self.kernel.grid, self.kernel.dim)

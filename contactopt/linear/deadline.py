@@ -3,8 +3,6 @@ needs to come. The driver looks at its clock after each outer iteration; an inne
 longer calls `check_time`, and one whose accuracy costs time asks `enough`.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,17 +28,13 @@ def time_left() -> float:
 
 
 def enough() -> float:
-    """The residual at which the solve ends over the present one: what the step that runs may leave.
-    It is 0 where all digits are asked for, and before a residual is known.
-    """
+    """The share of the present residual that a step may leave; 0 where all digits are asked for."""
     return _enough.get()
 
 
 @contextmanager
 def until(moment: float, enough: float = 0.0) -> Iterator[None]:
-    """Set the deadline, a time.perf_counter() [s], in the block, where an earlier one stays, and
-    the share of the present residual that is small enough.
-    """
+    """Set the deadline [s of perf_counter] in the block, and the share of the residual to reach."""
     tokens = _deadline.set(min(moment, _deadline.get())), _enough.set(enough)
     try:
         yield

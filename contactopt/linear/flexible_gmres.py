@@ -5,8 +5,6 @@ products do not use BLAS, whose threads would spin until the next call. Source: 
 flexible inner-outer preconditioned GMRES algorithm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -23,9 +21,7 @@ Act = Callable[[Any], Any]
 
 
 def flexible_gmres(product: Act, inverse: Act, right: Vector, weights: Vector, rtol: float) -> Any:
-    """Solve A x = b by GMRES with a preconditioner `inverse` that may change, to |W (b - A x)| <=
-    rtol |W b| with W = diag(weights); x after RUNS runs of RESTART iterations at most.
-    """
+    """Solve A x = b, `inverse` may change, to |W (b - A x)| <= rtol |W b|, W = diag(weights)."""
     x, residual = 0.0 * right, right
     goal = rtol * norm(weights * right)
     for run in range(RUNS):

@@ -79,9 +79,7 @@ class InterfaceOperator(LinearOperator):
         return self.counter.total
 
     def knowing(self, x: np.ndarray, X: Stacked) -> InterfaceOperator:
-        """Make the operator whose product with x (n,) begins with displacements X of the bodies,
-        as `coupled` has them, that are close to it.
-        """
+        """The operator whose products begin with X of the bodies, close to theirs."""
         known = copy(self)
         known.known = x.copy(), X
         return known
@@ -161,9 +159,7 @@ Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or I
 
 
 def form(Q: Interface) -> Form:
-    """How Q is known: by its entries in an array or sparse rows, or by products alone, of bodies
-    that are solved by iteration (`bodies`) or of half-spaces (`convolution`).
-    """
+    """How Q is known: as 'array' or 'sparse', or by products alone ('bodies' or 'convolution')."""
     if isinstance(Q, InterfaceOperator):
         return Q.form
     return "sparse" if sp.issparse(Q) else "array"
@@ -236,9 +232,7 @@ def asymmetry(Q: Interface) -> float:
 
 
 def eigenvalue_bound(Q: np.ndarray | sp.csr_array) -> float:
-    """A number above the largest eigenvalue of a semidefinite Q, by power steps, which approach it
-    from below; 1 for an empty or a zero matrix.
-    """
+    """A number above the largest eigenvalue of a semidefinite Q, by power steps; 1 for a zero Q."""
     n, value = Q.shape[0], 0.0
     v = (1 + 0.1 * np.cos(1.0 + np.arange(n))).astype(Q.dtype)
     for _ in range(POWER_STEPS if n else 0):

@@ -113,9 +113,7 @@ class CoupledForm:
 def in_equilibrium(
     form: CoupledForm, r: np.ndarray, rtol: float, first: Stacked | None = None
 ) -> Stacked:
-    """X close to A^-1 T' r for forces r, by conjugate gradients with one V-cycle from `first` on,
-    to rtol in energy.
-    """
+    """X close to A^-1 T' r, by conjugate gradients from `first` on, to rtol in energy."""
     pulled = form.pulled(r.ravel())
     X = 0.0 * pulled if first is None else first
     residual = pulled if first is None else pulled - form.stiffness(first)

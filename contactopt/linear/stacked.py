@@ -57,9 +57,7 @@ Vector: TypeAlias = Any  # an array (n,) or a Stacked
 
 
 def dot(x: Vector, y: Vector) -> float:
-    """The scalar product of two arrays, or of two vectors in the same parts. It does without BLAS,
-    whose threads would spin till the next call.
-    """
+    """The scalar product, without BLAS, whose threads would spin till the next call."""
     return float(x.dot(y)) if isinstance(x, Stacked) else float(np.einsum("i,i", x, y))
 
 

@@ -1,8 +1,8 @@
 """Tetrahedra divided by longest-edge bisection; each new boundary facet knows the old one it is of.
 
 A marked tetrahedron is halved at its longest edge, and so is, again and again, every other one of
-which an edge is divided. Of edges of the same length the one of the largest numbers comes first, so
-that elements agree on it and the division ends. Source: Rivara (1984), Algorithms for refining
+which an edge is divided. If edges are equally long, the one with the largest numbers comes first:
+so elements agree and the division ends. Source: Rivara (1984), Algorithms for refining
 triangular grids suitable for adaptive and multigrid techniques, Int. J. Numer. Meth. Engng 20.
 """
 

@@ -54,9 +54,7 @@ log = logging.getLogger(__name__)
 
 
 def read_bulk_data(path: Path) -> Any:
-    """The mesh of a file, with the properties as groups of elements. InputError with the line of
-    what is not read, Damaged for what is no such file.
-    """
+    """The mesh of a file, with properties as groups; InputError names a line, else Damaged."""
     import meshio
 
     reader = _Reader(path)

@@ -41,9 +41,7 @@ def is_curved(mesh: skfem.Mesh) -> bool:
 
 
 def straight(mesh: skfem.Mesh) -> skfem.Mesh:
-    """Make the mesh of the same vertices with straight edges; the mesh itself if it is straight.
-    Boundaries keep their names.
-    """
+    """Make the mesh of the same vertices and boundaries with straight edges."""
     if not is_curved(mesh):
         return mesh
     corners = np.ascontiguousarray(mesh.p[:, : mesh.nvertices])

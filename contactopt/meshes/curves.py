@@ -318,9 +318,7 @@ class _Blends:
         return s, np.linalg.norm(offset - s * along, axis=0)
 
     def _nearest(self, points: np.ndarray) -> np.ndarray:
-        """The number (m,) of the nearest edge: its middle is no further away than some edge is, and
-        half the longest one.
-        """
+        """The number (m,) of the nearest edge, by the distance of its middle."""
         some = self.tree.query(points.T)[1]
         reach = self._foot(points, some)[1] + self.length.max() * (1 + EQUAL) / 2
         found = self.tree.query_ball_point(points.T, reach)

@@ -56,9 +56,7 @@ def _on_ring(
 
 
 def extrude(p: np.ndarray, t: np.ndarray, z: np.ndarray) -> MeshHex:
-    """Stack (j - 1) m bricks over a plane mesh of nodes (2, n) and quadrilaterals (4, m), with
-    layers of nodes at the ascending heights z (j,) [length].
-    """
+    """Stack bricks over a plane mesh of quadrilaterals (4, m), between heights z [length]."""
     n, levels = p.shape[1], len(z)
     points = np.concatenate([np.tile(p, levels), np.repeat(z, n)[None]])
     a, b, c, d = (corner + n * np.arange(levels - 1)[:, None] for corner in t)

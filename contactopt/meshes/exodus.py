@@ -113,9 +113,7 @@ def _sides(kind: str, shell: bool) -> tuple[tuple[int, ...], ...]:
 
 
 def _named(variables: Mapping[str, Any], kind: str, key: str, word: str) -> list[tuple[str, int]]:
-    """Name and number, from 1, of each block or set that is there; without a name its word and
-    its own number.
-    """
+    """Name and number, from 1, of each block or set; without a name its word and own number."""
     ids = {"eb": "eb_prop1", "ss": "ss_prop1", "ns": "ns_prop1"}[kind]
     found = []
     count = len(variables[ids][:]) if ids in variables else 0

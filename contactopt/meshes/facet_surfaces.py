@@ -136,9 +136,7 @@ class _Skin:
         return _sphere(places, near) or _cylinder(places, self.normals[:, mine], near)
 
     def _guess(self, free: np.ndarray, given: np.ndarray) -> None:
-        """Set the middles of the edges in free regions by the normals at their ends, which are
-        `given` (3, n) or nan.
-        """
+        """Set the middles of edges in free regions by the normals at their ends, or nan."""
         places = np.empty_like(given)
         places[:, self.nodes] = self.corners
         for region in np.unique(self.region[free]):

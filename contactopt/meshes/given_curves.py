@@ -56,9 +56,7 @@ class Curve:
 
 
 def check_curve(curve: Curve, mesh: Mesh, boundary: str) -> None:
-    """Raise InputError unless the nodes of a boundary lie on its curve: where those of many facets
-    are further from it than OFF of the facet, or those of one than FAR.
-    """
+    """Raise InputError unless a boundary's nodes lie on its curve, to OFF of most facets."""
     corners = mesh.facets[:, mesh.boundaries[boundary]]
     places = mesh.p[:, corners]
     size = np.linalg.norm(np.ptp(places, axis=1), axis=0)

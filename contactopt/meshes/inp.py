@@ -190,9 +190,7 @@ class Scope:
             set_of(self.element_sets, own.name).update(dict.fromkeys((ids + by).tolist()))
 
     def name_sets(self) -> None:
-        """Unite the sets and surfaces of instances by their names. Where the assembly has one of
-        that name itself, those of the instances are called INSTANCE.NAME.
-        """
+        """Unite the sets and surfaces of instances by name; else they are INSTANCE.NAME."""
         taken = [{bare(n) for n in s} for s in (self.node_sets, self.element_sets, self.surfaces)]
         for own, by in self.instances.values():
 
@@ -210,9 +208,7 @@ class Scope:
                 self.surfaces.setdefault(named(name, 2), []).extend(moved)  # type: ignore[arg-type]
 
     def check(self) -> None:
-        """Raise InputError with the line of what names a node or element that is not there. Ranges
-        may have gaps, which are left out.
-        """
+        """Raise InputError for a missing node or element; ranges may have gaps."""
         self.settle()
         known = np.fromiter(self.nodes, np.int64)
         for kind, nodes, _, where in self.blocks:

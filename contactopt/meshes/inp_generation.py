@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 
 
 def motion(block: Block, rows: list[Row]) -> Callable[[np.ndarray], np.ndarray]:
-    """The motion of places (n, 3) along the first row, then around the axis of the second, two
-    points and an angle in degrees.
-    """
+    """The motion of places (n, 3) along the first row, then around the axis of the second."""
     values = [[block.real(line, word) for word in words] for line, words in rows]
     if len(values) > 2 or len((values or [[]])[0]) > 3 or (len(values) == 2 and len(values[1]) < 7):
         raise block.fail("a motion has three shifts, then two points and an angle")

@@ -26,9 +26,7 @@ if TYPE_CHECKING:
 
 
 def read_med(path: Path) -> Any:
-    """The mesh of a file with its groups as sets. Damaged, KeyError or OSError where the file
-    does not keep to the format.
-    """
+    """The mesh of a file with its groups; Damaged, KeyError or OSError for another format."""
     try:
         import h5py
     except ImportError as error:

@@ -31,9 +31,7 @@ WORD = re.compile(r"(?<![\w.])[A-Za-z]{2,}\w*")  # not the exponent of a number
 
 
 def read_medit(path: Path) -> Any:
-    """The mesh of a file, with the references of its elements. InputError with the line of what is
-    not read, Damaged for what is no such file.
-    """
+    """The mesh of a file with its references; InputError names a line, else Damaged."""
     import meshio
 
     text = re.sub(r'#.*|"[^"\n]*"', "", path.read_text("latin-1"))

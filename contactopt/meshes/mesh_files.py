@@ -224,9 +224,7 @@ def _kinds(groups: FileGroups, name: str, dim: int) -> set[str]:
 
 
 def _mesh(cells: Cells) -> tuple[skfem.Mesh, np.ndarray]:
-    """The mesh of scikit-fem, which has an order of its own for the nodes of an element, and the
-    node of it for every node of the file, or -1.
-    """
+    """The mesh of scikit-fem, and its own node for every node of the file, or -1."""
     import meshio
     from skfem.io.meshio import from_meshio
 

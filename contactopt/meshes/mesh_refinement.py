@@ -55,9 +55,7 @@ class TooSmall(InputError):
 
 
 def boundary_curves(mesh: Mesh) -> dict[str, Curve | None]:
-    """Find the line or surface that each boundary of a mesh stands for, by its name, '' for what
-    has none; None where it is flat.
-    """
+    """Each boundary's line or surface by name, '' for the rest; None where flat."""
     return plane_curves(mesh) if len(mesh.p) == 2 else space_curves(mesh)
 
 
@@ -84,9 +82,7 @@ def divide(mesh: Mesh, marked: np.ndarray, curves: Curves) -> Any:
 
 
 def graded(mesh: Mesh, large: Callable[[np.ndarray], np.ndarray], curves: Curves) -> Any:
-    """Divide the elements whose corners (dim, c, e) are `large`, a function to a mask (e,), and
-    their parts, until none is; the rest as for `divide`.
-    """
+    """Divide elements and their parts while `large` marks their corners, as `divide` does."""
     if not isinstance(mesh, MeshTet):
         while len(marked := np.flatnonzero(large(mesh.p[:, mesh.t]))):
             mesh = divide(mesh, marked, curves)
@@ -111,7 +107,7 @@ def split(mesh: Mesh, curves: Curves) -> Any:
     """Halve all elements of a mesh, with new nodes of curved boundaries on their curves, as for
     `divide`.
 
-    Order and named boundaries stay. Of second order, its nodes on edges and faces have become
+    Order and named boundaries stay. In a mesh of second order the nodes on edges and faces become
     corners.
     """
     fine = _refined(straight(mesh), 1, curves, mesh.doflocs if is_curved(mesh) else None)
@@ -235,9 +231,7 @@ def _shift(
 
 
 def named_like(old: Mesh, new: Mesh) -> Mesh:
-    """Give a mesh of the same body, or of a part of it, the named boundaries of another one, whose
-    boundary facets hold its own.
-    """
+    """Give a mesh of a part of the same body the named boundaries of another one."""
     if not old.boundaries:
         return new
     facets, outer = old.boundary_facets(), new.boundary_facets()

@@ -22,9 +22,7 @@ from contactopt.errors import Damaged
 
 
 def version(path: Path) -> tuple[str | None, bool]:
-    """The version that a file states, such as '4.1', or None if it is no file of Gmsh; and whether
-    it is binary.
-    """
+    """The version that a file of Gmsh states, such as '4.1', or None; whether it is binary."""
     with path.open("rb") as file:
         head = file.read(200).decode(errors="replace").split()
     if head[:1] == ["$NOD"]:
@@ -35,9 +33,7 @@ def version(path: Path) -> tuple[str | None, bool]:
 
 
 def read_msh4(path: Path) -> Any:
-    """The mesh of a file with the physical groups as sets of elements by name. Damaged or
-    KeyError where the file ends early or breaks the format.
-    """
+    """The mesh of a file with physical groups; Damaged or KeyError for a broken format."""
     sections = _sections(path)
     names = _names(sections)
     groups = _groups(sections.get("Entities"), names)

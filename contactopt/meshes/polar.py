@@ -38,9 +38,7 @@ def ring(radii: np.ndarray, angles: np.ndarray) -> MeshQuad2:
 
 
 def right_half_disc(radius: float, sectors: int) -> MeshQuad2:
-    """The half disc x >= 0 of a radius, with the boundaries 'rim' and 'axis', the diameter x = 0.
-    Its nodes divide the half circle evenly into 4 * sectors parts.
-    """
+    """The half disc x >= 0 with 'rim' and 'axis', its arc in 4 * sectors parts."""
     (x, y), t = half_disc(np.linspace(0.0, radius, 2 * sectors + 1), sectors)
     made = _quads(np.stack([y, -x]), t)
     facets = made.boundary_facets()
@@ -85,8 +83,6 @@ def _on_circles(mesh: MeshQuad, only: float | None = None) -> MeshQuad2:
 
 
 def even(start: float, end: float, parts: int) -> np.ndarray:
-    """Ascending radii (n,) of rings whose elements are about square, a geometric series from start
-    to end, for a number of elements along half the circle.
-    """
+    """Ascending radii of about square elements from start to end, so many along half the circle."""
     count = max(1, round(np.log(end / start) * parts / np.pi))
     return np.asarray(np.geomspace(start, end, count + 1))

@@ -19,9 +19,7 @@ KINDS |= {12: ("hexahedron", 8), 13: ("wedge", 6), 14: ("pyramid", 5)}
 
 
 def read_su2(path: Path) -> Any:
-    """The mesh of a file, with its markers as sets of elements. InputError with the line of what is
-    not read, Damaged for what is no such file.
-    """
+    """The mesh of a file with its markers; InputError names a line, else Damaged."""
     import meshio
 
     text = (line.split("%")[0].strip() for line in text_of(path).splitlines())

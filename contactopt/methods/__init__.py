@@ -75,9 +75,7 @@ METHODS = {
 
 
 def solves(method: Method, law: Law) -> bool:
-    """Whether a method solves problems of a law, in the variables in which methods see the law
-    (`Law.plain`). One that says nothing about it solves all.
-    """
+    """Whether a method solves problems of a law, in the variables of `Law.plain`."""
     predicate = getattr(method, "solves", None)
     return predicate is None or bool(predicate(law.plain))
 
@@ -93,9 +91,7 @@ def default_method(settings: Mapping[str, Any]) -> str:
 
 
 def find_method(name: str, **settings: Any) -> Method:
-    """The method of a name with its settings. InputError if there is no such method or setting, or
-    a setting has a wrong value.
-    """
+    """The method of a name with its settings; InputError for a wrong name, setting or value."""
     if name not in METHODS:
         raise InputError(f"unknown method {name!r}; choose from {', '.join(METHODS)}.")
     module, cls, _ = METHODS[name]

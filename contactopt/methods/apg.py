@@ -12,8 +12,6 @@ Sources: O'Donoghue, Candes (2015), Adaptive restart; Acary, Cadoux, Lemarechal,
 formulation of the linear discrete Coulomb friction problem via convex optimization.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import sqrt
@@ -28,8 +26,6 @@ from contactopt.methods.kernels.balance import project_balanced
 from contactopt.methods.method import Iterate, Method, at_rest
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.laws.law import Projected
-
-INNER = 2000  # products with Q in one subproblem
 
 
 @dataclass(frozen=True)
@@ -68,7 +64,7 @@ def accelerate(
 ) -> Iterate:
     """Minimise a quadratic over the set of prox until a step moves r by `accuracy` at most."""
     y, momentum = r, 1.0
-    for _ in range(INNER):
+    for _ in range(2000):  # products with Q in one subproblem
         check_time()
         new, lam = prox(y - step * gradient(y), lam)
         move, along = new - y, new - r

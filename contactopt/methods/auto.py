@@ -29,8 +29,6 @@ proximal loop.
 It ends where the driver's certificate or limits say so.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
@@ -134,9 +132,7 @@ class _Swept:
         self.r = np.array(first, order="C")
 
     def points(self, most: int, between: int, budget: float) -> Iterator[Iterate]:
-        """Points that `most` sweeps reach within a number of multiplications, if they converge: the
-        second has all digits, and the first most of them where each sweep is expensive.
-        """
+        """Points that `most` sweeps reach within a number of multiplications: rough, then exact."""
         problem = self.problem
         explicit = has_entries(problem.Q)
         size = problem.Q.nnz if form(problem.Q) == "sparse" else problem.q.size**2
@@ -158,9 +154,7 @@ class _Swept:
         yield self.r.copy(), np.zeros(0)
 
     def reached(self, enough: float, sweeps: Sweeps, most: int, often: int) -> int:
-        """The number of sweeps, at most so many, until a change is small enough; 0 if none is. The
-        clock is looked at every so often.
-        """
+        """The number of sweeps, at most so many, until a change is small enough; else 0."""
         for done in range(0, most, often):
             check_time()
             change, more = sweeps(self.r, min(often, most - done), enough=enough)
@@ -290,9 +284,7 @@ class _Robust:
         pace: Pace = "steady",
         aim: float = np.inf,
     ) -> Generator[Iterate | Known, None, Iterate]:
-        """Iterates of the proximal loop while each `patience` of them halve the residual; returns
-        the last. `aim` is the residual that the first of these rounds must reach.
-        """
+        """The last proximal iterate, while every `patience` of them halve the residual."""
         equations = coulomb_equations(self.problem)
         best, target, point = np.inf, aim, start
         iterates = proximal_iterates(self.problem, self.matrix, start, alpha, pace)
@@ -314,10 +306,7 @@ class _Robust:
 def _newton(
     problem: InterfaceProblem, start: Iterate | None, preconditioner: str | None
 ) -> Generator[Iterate | Known, None, Iterate]:
-    """Newton's iterates; returns the best. Where the entries of Q, which the next stages need, are
-    dear, it goes on until its products have cost as much. After a start that leads nowhere it
-    begins anew at the bonded solution.
-    """
+    """The best of Newton's iterates; a start that fails is replaced by the bonded solution."""
     Q = problem.Q
     dear = not has_entries(Q) and (Q.coupled is not None or problem.q.size > constants.FEW_ENTRIES)
 
@@ -334,7 +323,7 @@ def _newton(
         warm = found or start
         note(
             logger,
-            "Newton's method made no progress from the given start and begins anew without it",
+            "Newton's method made no progress from the given start and starts again without it",
         )
     found, residual = yield from _followed(method.with_residuals(problem, None), spent)
     return (found if residual < least else warm) or cold_start(problem)
@@ -343,9 +332,7 @@ def _newton(
 def _followed(
     points: Iterator[tuple[Iterate | Known, float]], tired: Callable[[int, int], bool]
 ) -> Generator[Iterate | Known, None, tuple[Iterate | None, float]]:
-    """Hand points on until a stage repeats itself or is `tired`, a function of the number of points
-    and of those since the last progress; returns the best point and its residual.
-    """
+    """Hand points on until a stage is `tired` or repeats itself; returns the best, its residual."""
     best, reached, since, seen = np.inf, None, 0, np.zeros(0)
     for steps, (point, residual) in enumerate(points, start=1):
         try:

@@ -15,8 +15,6 @@ Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear di
 friction problem via convex optimization.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -87,7 +85,7 @@ def _opening(problem: InterfaceProblem, r: np.ndarray, multipliers: np.ndarray) 
 def cone_program(
     problem: InterfaceProblem, bridge: str, backend: str
 ) -> Callable[[np.ndarray], Iterate]:
-    """The cone program of the module's head, from the opening mu s (k,) [length] to its answer."""
+    """The cone program defined at the top, from the opening mu s (k,) [length] to its answer."""
     V, s_plates = problem.V, problem.s
     if bridge == "cvxpy":
         from contactopt.models import acary_cadoux

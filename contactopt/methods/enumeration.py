@@ -10,8 +10,6 @@ states; it is represented by one of its points. Time grows exponentially with th
 in the worst case.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.checks import check_number
@@ -40,8 +38,8 @@ def all_solutions(problem: InterfaceProblem, limit: int = 100) -> list[Solution]
 
     Returns
     -------
-    The solutions, each certified; an empty list if there is none. Of a continuum of solutions with
-    the same states one is listed.
+    The solutions, each certified; an empty list if there is none. If a
+    continuum of solutions has the same states, one of them is listed.
 
     Raises
     ------

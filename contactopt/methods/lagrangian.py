@@ -12,8 +12,6 @@ Sources: Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational
 Uzawa's method; Panagiotopoulos (1975) for the alternation.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -31,8 +29,6 @@ from contactopt.methods.kernels.splitting import Components, NormalProblem
 from contactopt.methods.method import NATIVE, Iterate
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative
-
-INNER = 5000  # Uzawa steps in one tangential problem
 
 
 @dataclass(frozen=True)
@@ -64,7 +60,7 @@ class Tangential(Components):
         c, s = self.given(r[:, 0], lam)
         r_t, radius, own = r[:, 1:], self.problem.law.bound(r[:, 0]), lam[self.own]
         project: Projection = lambda y: disc_derivative(y, radius)  # noqa: E731
-        for _ in range(INNER):
+        for _ in range(5000):  # Uzawa steps in one tangential problem
             check_time()
             y = r_t - self.step * ((self.Q @ r_t.ravel()) + c).reshape(self.shape)
             new, own = project_balanced(project, y, self.V, s, self.step, own)

@@ -1,7 +1,5 @@
 """What every method offers: it yields one iterate after the other, and says what it needs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Protocol
 
@@ -18,7 +16,7 @@ NATIVE = "native"  # in place of a backend's name: our own linear algebra
 
 
 class Method(Protocol):
-    """What every method offers, as the head of contactopt.methods says."""
+    """What every method offers, as contactopt.methods describes it."""
 
     def iterate(
         self, problem: InterfaceProblem, start: Iterate | None = None
@@ -27,9 +25,7 @@ class Method(Protocol):
         ...
 
     def backends(self, dim: int) -> tuple[str, str]:
-        """The normal and the tangential backend for dim 2 or 3, NATIVE where the method needs none.
-        InputError if one cannot be used.
-        """
+        """The normal and tangential backend for dim, NATIVE for none; InputError if unusable."""
         return NATIVE, NATIVE
 
 

@@ -3,8 +3,6 @@ sentence. The driver opens `collected` around each solve, whose Solution keeps t
 threads.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -41,9 +39,7 @@ def collected() -> Iterator[list[str]]:
 
 
 def remark(problem: InterfaceProblem, solution: Solution) -> None:
-    """Say where the forces of a small problem may be far off although they are certified. Forces
-    that contacts at one place exchange are contactopt.methods.exchanged's to speak of.
-    """
+    """Say where the forces of a small problem may be far off although they are certified."""
     at, loose = solution, solution.solved and solution.residual > EXACT
     if not loose or problem.contacts > FEW or form(problem.Q) != "array":
         return

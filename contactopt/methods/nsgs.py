@@ -13,8 +13,6 @@ Source: Jourdan, Alart, Jean (1998), A Gauss-Seidel like algorithm to solve fric
 problems.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot, inf
@@ -31,10 +29,7 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws.law import Law
 
-ROOT = 1e-14  # relative accuracy of the local slip problem
 STEPS = 60  # Newton or bisection steps for it
-PENALTY = 10.0  # tau V'V
-OFTEN = 100  # contacts between two looks at the clock
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ class NSGS(Method):
                 sweeps(r, 1, self.relaxation)
                 yield r.copy(), lam
         flat = r.reshape(-1)  # a view: changes with r
-        tau = PENALTY / np.maximum(np.sum(V**2, axis=0), 1e-300)
+        tau = 10.0 / np.maximum(np.sum(V**2, axis=0), 1e-300)  # tau V'V
         motions = V.reshape(k, dim, -1)
         rows = [_coupling(problem.Q, dim, i) for i in range(k)]
         bounds = zip(rows, motions, problem.mu, problem.law.lowest == 0)
@@ -77,7 +72,7 @@ class NSGS(Method):
             w = problem.q + (V @ (lam + tau * s)).reshape(k, dim)
             pushed = V.T @ flat
             for i, (local, (others, Q, _), T) in enumerate(zip(contacts, rows, motions)):
-                if i % OFTEN == 0:
+                if i % 100 == 0:  # contacts between two looks at the clock
                     check_time()
                 old = r[i].copy()
                 moved = Q @ flat[others] + w[i]
@@ -149,7 +144,7 @@ class Local:
             size, normal = hypot(t1, t2), press - w1 * t1 - w2 * t2
             way = -1.0 if self.bilateral and normal < 0 else 1.0
             excess = size - mu * way * normal
-            if (level == 0.0 and excess <= 0) or abs(excess) <= ROOT * size:
+            if (level == 0.0 and excess <= 0) or abs(excess) <= 1e-14 * size:
                 break
             low, high = (level, high) if excess > 0 else (low, level)
             # derivatives by level

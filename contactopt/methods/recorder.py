@@ -1,7 +1,5 @@
 """What a solve keeps of its iterates: history, certificate, best answer, and when it ends."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,12 +13,10 @@ from contactopt.methods.method import Iterate, Known
 from contactopt.problem import InterfaceProblem, Scales, Status, natural_map_residual
 from contactopt.problem.certificate import Moved
 
-CYCLE = 12  # longest cycle that is looked for
 ROUGH = 1e-5  # accuracy of products in a rough certificate
 LEAST_PROOF = 0.3  # seconds for a proof past the time limit
 SAME = 1e-11  # relative distance at which two iterates are the same state
 LOST = 1e15  # dimensionless size of an iterate beyond which rounding leaves no digit
-CONFIRM = 8  # repeated states in a row of a method that goes nowhere
 State = tuple[np.ndarray, float]  # forces and multipliers in one array, and its norm
 
 
@@ -75,9 +71,7 @@ class Recorder:
         self.residual, self.reactions, self.multipliers, self.displacements = self.best
 
     def _certificate(self, known: Sequence[Moved]) -> float:
-        """The natural-map residual, by the method's own Q r; where products cost iterations, to a
-        digit only as long as it is far from the tolerance.
-        """
+        """The natural-map residual by the method's own Q r, cheaply far from the tolerance."""
         self.displacements, point = None, (self.reactions, self.multipliers)
         if known:
             length, X = self.scales.length, known[0].displacements
@@ -109,7 +103,7 @@ class Recorder:
         state = np.concatenate([r.ravel(), lam])
         now = state, float(np.linalg.norm(state))
         same = [_same(now, old) for old in reversed(self.recent)]
-        self.recent = [*self.recent[1 - CYCLE :], now]
+        self.recent = [*self.recent[1 - 12 :], now]  # longest cycle that is looked for
         row = {"residual": self.residual, "change": change, "seconds": self.clock}
         self.history.append(row | counts)
         if limits.progress is not None:
@@ -121,7 +115,7 @@ class Recorder:
         if limits.change_tol is not None and len(self.history) > 1 and change <= limits.change_tol:
             return Status.SETTLED
         self.repeated = self.repeated + 1 if any(same) else 0
-        if self.repeated >= CONFIRM:
+        if self.repeated >= 8:  # repeated states in a row of a method that goes nowhere
             return Status.STALLED if same[0] else Status.CYCLING
         return self.late
 
@@ -134,9 +128,7 @@ class Recorder:
 
     @property
     def enough(self) -> float:
-        """Share of the present residual that a step may leave. Who does not ask for less than the
-        usual tolerance gets all digits of the last step.
-        """
+        """Share of the residual that a step may leave; 0 in a last one that needs all digits."""
         return self.limits.tol / self.residual if self.limits.tol > TOL else 0.0
 
     def left(self) -> float:

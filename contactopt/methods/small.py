@@ -4,8 +4,6 @@ need no scaling. What they do not solve goes on as without them, and so does eve
 package was installed without a compiler.
 """
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
@@ -46,9 +44,7 @@ def solve_small(
 
 
 def arrays_of(problem: InterfaceProblem) -> tuple[int, list[np.ndarray]] | None:
-    """What the compiled code takes of a problem: the dimension, Q by rows, friction and q. None
-    where it does not take it.
-    """
+    """Dimension, rows of Q, friction and q for the compiled code; None if it cannot take them."""
     if type(problem.law) is not Coulomb or not problem.q.size or len(problem.s):
         return None
     kind, Q, none = form(problem.Q), problem.Q, gauss_seidel.NONE

@@ -47,8 +47,6 @@ convergence near this solution, exact unless a contact is between two states; gl
 other solutions and the solution's change of state with mu are not covered: a heuristic there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +57,6 @@ from contactopt.problem.contact_status import contact_status
 
 # an eigenvalue with relatively less imaginary part is real; a smaller one is rounding
 REAL, ZERO = 1e-7, 1e-10
-DEFINITE = 1e-10  # least eigenvalue of a definite matrix, over the largest entry
 
 
 @dataclass(frozen=True)
@@ -113,8 +110,8 @@ def _parts(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 def thresholds(
     problem: InterfaceProblem, shape: np.ndarray, energy: bool
 ) -> tuple[Thresholds, Thresholds, bool]:
-    """Of a dimensionless problem with coefficients mu * `shape`: what is guaranteed, what uniform
-    slip loses, and whether both are the same. `energy`: Q is symmetric.
+    """The guaranteed thresholds of a dimensionless problem with coefficients mu * `shape`, those
+    at which uniform slip fails, and whether both are the same. `energy`: Q is symmetric.
     """
     low, high = Thresholds(0.0, 0.0, 0.0), _uniform_slip(problem, shape)
     if not energy:
@@ -128,9 +125,7 @@ def thresholds(
 
 
 def _turns_one_way(problem: InterfaceProblem) -> bool:
-    """Whether the determinants of Q (2, 2) and of its entry for slip are positive, where a plate
-    does not give the normal force.
-    """
+    """Whether det Q (2, 2) and its entry for slip are positive, unless a plate gives the force."""
     Q = problem.Q
     try:
         check_definite(Q[1:, 1:], Q)
@@ -142,7 +137,7 @@ def _turns_one_way(problem: InterfaceProblem) -> bool:
 
 
 def _guaranteed(problem: InterfaceProblem, shape: np.ndarray, energy: bool) -> Thresholds:
-    """Statements 1 and 2 of the module's head; 2 if Q has an `energy`."""
+    """Statements 1 and 2 from the top; 2 if Q has an `energy`."""
     n, t = _parts(problem)
     nn, nt, tn, tt = (problem.Q[np.ix_(i, j)] for i in (n, t) for j in (n, t))
     try:
@@ -169,19 +164,15 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray, energy: bool) -> T
 
 
 def check_definite(A: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """A, if its symmetric part is positive definite far above the rounding of another matrix;
-    LinAlgError if not. That of no size is.
-    """
+    """A, if its symmetric part is definite far above another's rounding, else LinAlgError."""
     least = np.inf if not A.size else la.eigvalsh((A + A.T) / 2, subset_by_index=(0, 0))[0]
-    if least <= DEFINITE * np.abs(beside).max(initial=0.0):
+    if least <= 1e-10 * np.abs(beside).max(initial=0.0):  # not above rounding
         raise la.LinAlgError("not definite")
     return A
 
 
 def _largest(A: np.ndarray, B: np.ndarray) -> float:
-    """Largest eigenvalue of A x = value B x for the symmetric parts, at least 0; LinAlgError unless
-    that of B is definite.
-    """
+    """Largest eigenvalue of A x = value B x, at least 0; LinAlgError unless B is definite."""
     symmetric = (A + A.T) / 2, (B + B.T) / 2
     last = (len(A) - 1,) * 2
     return max(0.0, float(la.eigh(*symmetric, eigvals_only=True, subset_by_index=last)[0]))

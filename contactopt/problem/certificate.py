@@ -49,8 +49,6 @@ differ much have displacements that differ little (`amplification` says how much
 all units, and costs one product with Q.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,13 +65,11 @@ ACTS = 1e-6  # share of the largest force from which on a contact's displacement
 # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
 ROUNDED = 1e-6
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
-UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
 # rounding of r - rho u, over r, and how many times F the forces are from where on it counts
 ROUNDING, UNSEEN = 2.0**-52, 1e4
 # share of a gap, or of the largest motion, up to which what motions leave of a gap is none: they
 # are known to the rounding of the few equations that give them
 CANCELLED = 16 * ROUNDING
-STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +95,7 @@ class Yardsticks:
     rho: np.ndarray
 
     def errors(self, law: Law, r: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """e_i (k,) of the head of this module, for forces r and displacements u, both (k, dim)."""
+        """e_i (k,) as defined at the top, for forces r and displacements u, both (k, dim)."""
         return lengths(r - law.mapped(r - self.rho[:, None] * u)) / self.force
 
 
@@ -159,9 +155,7 @@ def natural_map_residual(
 def yardsticks(
     problem: InterfaceProblem, r: np.ndarray, d: np.ndarray, w: np.ndarray
 ) -> Yardsticks:
-    """Force F, length L and steps rho, as at the top of this module, for forces r and the finite
-    displacements d = Q r and w = q + V lambda, all (k, dim).
-    """
+    """Force F, length L and steps rho, as above, for r and finite d = Q r and w = q + V lambda."""
     size, gap = lengths(r), w[:, 0]
     largest = float(size.max())
     weight = np.minimum(1.0, size / (ACTS * largest)) if largest > 0 else np.zeros(len(r))
@@ -186,7 +180,7 @@ def yardsticks(
     force = force or 1.0  # no force, and none that would make a displacement: any number serves
     if length == 0:
         return Yardsticks(force, 0.0, np.zeros(len(r)))
-    stiff = np.minimum(np.maximum(mean * problem.stiffnesses, 1.0), STIFFEST)
+    stiff = np.minimum(np.maximum(mean * problem.stiffnesses, 1.0), 1e4)  # times the mean rho
     return Yardsticks(force, length, stiff * (force / length))
 
 
@@ -249,7 +243,7 @@ def amplification(
     reach = np.where(problem.reach > 0, problem.reach, 1.0)
     V, size = problem.V / reach, np.maximum(np.abs(problem.s) / reach / measure.force, 1.0)
     _, felt, motions = la.svd(rows @ V, full_matrices=False)
-    Z = motions[felt > UNFELT * felt.max(initial=0.0)].T
+    Z = motions[felt > 1e-12 * felt.max(initial=0.0)].T  # the rest moves nothing held
     scale, n = measure.length / measure.force, k * dim
     M = np.block(
         [
@@ -299,9 +293,7 @@ def siconos_residual(
 
 
 def fit_multipliers(problem: InterfaceProblem, reactions: np.ndarray) -> np.ndarray:
-    """The multipliers (p,) that fit reactions best: least squares on u_n where pressed, u_t where
-    sticking; zeros where no displacement must vanish.
-    """
+    """The multipliers (p,) that fit best: u_n = 0 where pressed, u_t = 0 where sticking."""
     r = np.asarray(reactions, dtype=float)
     rows = np.repeat(problem.law.sticking(r)[:, None], problem.dim, axis=1)
     rows[:, 0] = problem.law.pressed(r)

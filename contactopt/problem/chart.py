@@ -49,9 +49,7 @@ class Chart:
 
     @classmethod
     def of_points(cls, coordinates: np.ndarray, dim: int) -> Chart:
-        """Lay a chart through bare points (d, k) [length]: as they are if d = dim - 1, else from
-        their middle along principal directions, whose largest components are positive.
-        """
+        """A chart of points (d, k): as they are if d = dim - 1, else along principal directions."""
         count = dim - 1
         if len(coordinates) <= count:
             missing = np.zeros((count - len(coordinates), coordinates.shape[1]))
@@ -72,9 +70,7 @@ class Chart:
         return np.argsort(self.places[0], kind="stable")
 
     def images(self) -> tuple[np.ndarray, np.ndarray]:
-        """The places (dim - 1, m) [length] of the whole surface with all mirror images, and the
-        contact (m,) of each; a contact on a plane or axis stands there once.
-        """
+        """Places (dim - 1, m) with all mirror images, and the contact (m,) of each."""
         x, contact = self.places, np.arange(self.places.shape[1])
         near = EQUAL * np.abs(x).max(initial=0.0)
         for axis in np.flatnonzero(self.mirrored):
@@ -84,9 +80,7 @@ class Chart:
         return x, contact
 
     def spacing(self) -> np.ndarray:
-        """The distances (k,) [length] between the two neighbours of every contact of a line, at an
-        end to the only one.
-        """
+        """Distances (k,) between the two neighbours on a line, at an end to the only one."""
         order = self.order()
         steps, spacing = np.diff(self.places[0, order]), np.empty(len(order))
         if self.period is not None:
@@ -118,7 +112,7 @@ class Pair:
 
     @property
     def contacts(self) -> slice:
-        """Of arrays with one row per contact."""
+        """Its rows in arrays with one row per contact."""
         return slice(self.start, self.stop)
 
 

@@ -6,8 +6,6 @@ A function that ends in `_derivative` gives the nearest points and the generalis
 projection.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 DIRECTIONS = 16  # of the polygon in a disc
@@ -32,9 +30,7 @@ def unit(t: np.ndarray) -> np.ndarray:
 
 
 def simplex_steps(entries: int) -> int:
-    """How many steps a linear program with so many entries may take: about five seconds, but
-    counted, so that the answer does not depend on the load of the machine.
-    """
+    """The steps that a linear program with so many entries may take: about five seconds' worth."""
     return 300 + int(1e9 / max(entries, 1))
 
 
@@ -102,9 +98,7 @@ def cylinder_derivative(
 def disc_of_height(
     height: np.ndarray, t: np.ndarray, mu: np.ndarray, slope: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of t (k, dim - 1) alone on discs of radius mu |height|, and its derivative; the
-    heights (k,) stay. `slope` (k,) is the derivative of |height|.
-    """
+    """t (k, dim - 1) projected on discs of radius mu |height|, and its derivative."""
     k, dim = len(t), t.shape[1] + 1
     bound, length = mu * np.abs(height), lengths(t)
     slip = length > bound

@@ -13,8 +13,6 @@ made exact by a least-squares step, and checked in floating point on its own. So
 for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 
@@ -30,7 +28,6 @@ from contactopt.problem.scaling import dimensionless, isotropic
 
 MOST_ENTRIES = 3_000_000  # entries of the program up to which it is tried
 MARGIN = 1e-7  # least -(q' e + s' z) of a ray of size one, over the size of its terms
-POLISH = 3  # least-squares steps
 
 log = logging.getLogger(__name__)
 
@@ -38,7 +35,7 @@ log = logging.getLogger(__name__)
 @dataclass(frozen=True)
 class Infeasible:
     """A proof that a problem has no solution: the ray (weights y (k,), motions z (p,)) of this
-    module's head, or the contradictions of all states of the contacts
+    module's docstring, or the contradictions of all states of the contacts
     (contactopt.methods.kernels.states), for which y and z are zero.
 
     sentence  what it means, for people
@@ -76,7 +73,7 @@ def infeasibility(problem: InterfaceProblem, time_limit: float = np.inf) -> Infe
     ray = _program(scaled, Q, time_limit)
     if ray is None:
         return None
-    for _ in range(POLISH):
+    for _ in range(3):  # least-squares steps
         if _verified(scaled, Q, *ray):
             weights, motions = ray
             work = float(scaled.q[:, 0] @ weights + scaled.s @ motions)

@@ -43,9 +43,6 @@ from contactopt.problem.cones import lengths
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.law import Law
 
-# largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
-SYMMETRIC = 1e-2
-TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
 GENERIC = np.sqrt([1.0, 2.0, 3.0])  # a direction that no lattice of contacts repeats
 
 
@@ -194,7 +191,7 @@ class InterfaceProblem:
     @cached_property
     def symmetric(self) -> bool:
         """Whether Q is symmetric to 1 %, as methods that minimise an energy need it."""
-        return asymmetry(self.Q) <= SYMMETRIC
+        return asymmetry(self.Q) <= 1e-2  # rounding of the code that wrote Q
 
     @cached_property
     def fingerprint(self) -> str:
@@ -230,13 +227,11 @@ class InterfaceProblem:
 
     @cached_property
     def shared_places(self) -> list[np.ndarray]:
-        """The contacts at every place that has several, where the pairs of surfaces have names:
-        matrices alone tell of no surface that meets another.
-        """
+        """The contacts at each place that has several, if the pairs have names."""
         x = self.coordinates
         if x.shape[1] != self.contacts or self.contacts < 2 or self.pairs[0].name == UNNAMED:
             return []
-        near = TOGETHER * (x.max(axis=1) - x.min(axis=1)).max()
+        near = 1e-9 * (x.max(axis=1) - x.min(axis=1)).max()  # of the extent: one place
         line = GENERIC[: len(x)] @ x  # no two points of a grid fall together
         line.sort()
         if (line[1:] - line[:-1]).min() > GENERIC.sum() * near:

@@ -2,8 +2,6 @@
 something within one pair only.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +13,7 @@ from contactopt.problem.solution import Solution
 
 
 def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
-    """The contacts (k_i) of one pair of surfaces as a problem, without forces at all others. Where
-    there is one pair only, it is the problem itself.
-    """
+    """The contacts of one pair of surfaces as a problem, without forces elsewhere."""
     if len(problem.pairs) == 1:
         return problem
     own = pair.contacts
@@ -38,9 +34,7 @@ def part_of(problem: InterfaceProblem, pair: Pair) -> InterfaceProblem:
 def alone(
     problem: InterfaceProblem, solution: Solution, pair: Pair
 ) -> tuple[InterfaceProblem, Solution]:
-    """One pair of surfaces alone, its problem and solution, under the forces of all other pairs as
-    they are in the solution. Where there is one pair, both as they are.
-    """
+    """The problem and solution of one pair of surfaces under the forces of all others."""
     if len(problem.pairs) == 1:
         return problem, solution
     part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers

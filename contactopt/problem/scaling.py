@@ -1,7 +1,5 @@
 """The form in which methods work: without units, with friction the same in all directions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,9 +124,7 @@ def scales_of(problem: InterfaceProblem) -> Scales:
 
 
 def without_rounding(V: np.ndarray) -> np.ndarray:
-    """Motions V (n, p) without entries that are rounding beside the largest of their column: forces
-    without friction would hold a body along a flat surface by them, unseen by the certificate.
-    """
+    """V (n, p) without entries that are rounding beside the largest of their column."""
     size = np.abs(V)
     return np.where(size > NOISE * size.max(axis=0, initial=0.0), V, 0.0)
 
@@ -152,9 +148,7 @@ def immovable(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _closing(problem: InterfaceProblem) -> float:
-    """Root mean square of the overlaps at r = 0; without any, the least |q_i|. Those that are
-    rounding beside the largest one do not count.
-    """
+    """Root mean square of the overlaps at r = 0 above rounding; without any, the least |q_i|."""
     normal, sizes = problem.q[:, 0], np.linalg.norm(problem.q, axis=1)
     overlap = np.where(problem.law.lowest < 0, np.abs(normal), -normal)
     least = NOISE * sizes.max(initial=0.0)

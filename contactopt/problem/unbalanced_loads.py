@@ -14,8 +14,6 @@ own.
 Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +28,7 @@ from contactopt.problem.scaling import isotropic, without_rounding
 
 # work of the largest load over a motion's displacements from which on the motion counts
 SURE = 1e-6
-BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
-TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +49,7 @@ class Escape:
 
 
 def escape(problem: InterfaceProblem) -> Escape | None:
-    """A motion along which the loads drive the bodies away from all contacts, or None; only one
-    that does not slide where the bound of friction is neither given nor mu r_n.
-    """
+    """A motion along which loads drive the bodies away from all contacts, or None."""
     if not np.any(problem.s):
         return None
     problem = isotropic(problem)
@@ -85,15 +79,13 @@ def _described(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> 
     body = max(work, key=lambda owner: work[owner])
     size = np.abs(motion) * np.array([owner == body for owner in owners])
     turns = size * np.array(["rotation" in name for name in problem.motions] or np.zeros(len(s)))
-    if opens and turns.max() > TURNING * size.max():
+    if opens and turns.max() > 1e-3 * size.max():  # it tips over
         size = turns
     return Escape(motion, int(np.argmax(size)), opens, bool(still))
 
 
 def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Bases, orthogonal to each other, of the motions that contacts resist (p, m) and that nothing
-    resists (p, f).
-    """
+    """Orthogonal bases of the motions that contacts resist (p, m) and that nothing does (p, f)."""
     resists = np.repeat(problem.law.rough[:, None], problem.dim, axis=1)
     resists[:, 0] = True
     sizes, count = np.linalg.norm(problem.V, axis=0), len(problem.s)
@@ -105,9 +97,7 @@ def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 
 
 def resisted(problem: InterfaceProblem) -> tuple[InterfaceProblem, np.ndarray | None, str]:
-    """The problem in the motions that contacts resist, their basis (p, m), and a sentence about the
-    others; the problem, None and '' where there are none, and where the loads push along one.
-    """
+    """The problem in the motions that contacts resist, their basis or None, and a sentence."""
     kept, loose = sorted_motions(problem)
     work = np.abs(loose.T @ problem.s) > SURE * (np.abs(loose.T) @ np.abs(problem.s))
     if not loose.shape[1] or work.any():
@@ -140,9 +130,7 @@ def _along(rows: sp.csr_array, dim: int) -> list[Any]:
 
 
 def _given(problem: InterfaceProblem) -> np.ndarray:
-    """(k,) given bounds of friction over the largest load: 0 where friction is mu r_n, infinite
-    where the bound depends on r_n in another way.
-    """
+    """(k,) friction bounds over the largest load: 0 if mu r_n, infinite if nonlinear in r_n."""
     force = np.abs(problem.s).max()
     bounds = [problem.law.bound(np.full(problem.contacts, r_n)) for r_n in (0.0, force)]
     other = problem.law.rough & (problem.law.coefficient == 0)
@@ -157,7 +145,7 @@ def _balanced(problem: InterfaceProblem, s: np.ndarray, given: np.ndarray) -> bo
     bound = problem.mu * normal + np.where(np.isinf(given) & ~shut, 0.0, given)
     held = np.all(normal >= 0) and np.all(np.linalg.norm(r[:, 1:], axis=1) <= bound)
     left = np.linalg.norm(problem.V.T @ even + s)
-    return bool(held and left <= BALANCED * np.linalg.norm(s))
+    return bool(held and left <= 1e-10 * np.linalg.norm(s))  # counts as exact
 
 
 def _search(
@@ -258,9 +246,7 @@ def sentence(problem: InterfaceProblem, found: Escape) -> str:
 
 
 def check_equilibrium(problem: InterfaceProblem) -> None:
-    """Raise Unbalanced for a load that no contacts can balance: bodies escape along a named motion,
-    or a plate is pulled off along the normals.
-    """
+    """Raise Unbalanced for a load that no contacts can balance, with the motion's name."""
     if problem.motions:
         found = escape(problem)
         if found is not None:

@@ -2,7 +2,7 @@
 
 Facets leave the curve between its nodes. Where the meshes of two curved surfaces do not match, the
 gap between their facets therefore differs from that between the curves, by another amount at every
-contact. Of elements of second degree with straight edges, the nodes within edges do not lie on the
+contact. If elements of second degree have straight edges, the nodes within edges do not lie on the
 curve either. At contact i the gap of the curves is larger than that of the facets by
 
     d_i = int psi_i (c_upper - c_lower) . n / int phi_i,
@@ -53,9 +53,7 @@ INSIDE = 8  # order of the quadrature in a cell, whose points sample the chords 
 
 
 def chord_remarks(reduction: Reduction, solution: Solution) -> list[str]:
-    """One sentence for each pair of surfaces whose largest pressure owes more than SHOWN of itself
-    to the facets of its meshes.
-    """
+    """A sentence on each pair whose largest pressure owes more than SHOWN to straight facets."""
     if not solution.solved:
         return []
     d, angles = _heights_and_angles(reduction)

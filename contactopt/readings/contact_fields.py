@@ -2,8 +2,6 @@
 VTU files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -73,9 +71,7 @@ class ContactFields:
         }
 
     def rows(self, axes: Sequence[str], units: tuple[str, str]) -> tuple[list[str], list[Any]]:
-        """The head of a table with the units of length and stress, and one row per contact, empty
-        where it lies at no node of a body.
-        """
+        """The head of a table with units, and a row per contact, empty at no node of a body."""
         length, stress = units
         head = [*(f"{axis} [{length}]" for axis in axes), f"area [{length}^2]"]
         head += [f"pressure [{stress}]", *(f"traction_{axis} [{stress}]" for axis in axes)]
@@ -104,9 +100,7 @@ def _tall(x: np.ndarray) -> np.ndarray:
 
 
 def _along(normals: np.ndarray, points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """The cells (v, c), in space each turned so that its corners go around the normals (k, dim) of
-    the contacts in the positive sense.
-    """
+    """The cells (v, c), in space turned to go around the normals (k, dim) positively."""
     if len(points) < 3:
         return cells
     x = points[:, cells]

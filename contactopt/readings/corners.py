@@ -11,8 +11,6 @@ corners of plates in extension; Dundurs, Lee (1972), Stress concentration at a s
 problems, Journal of Elasticity 2.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from skfem import Mesh
 
@@ -110,9 +108,7 @@ def _share(part: Part, scene: Scene, place: np.ndarray, reach: float, away: floa
 
 
 def re_entrant(mesh: Mesh, vertex: int) -> bool:
-    """Whether a vertex, or one within two elements of it, is at a re-entrant corner or edge. (The
-    recovered stress at the corner itself may be less than that next to it.)
-    """
+    """Whether a vertex is within two elements of a re-entrant corner or edge."""
     cells = simplices(mesh)
     near = np.array([vertex])
     for _ in range(2):

@@ -21,8 +21,6 @@ zone nearer to a rectangle than to an ellipse, half of the side of the square wi
 Where an end cannot be read, the nodal areas are counted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -52,7 +50,6 @@ from contactopt.readings.patches import End, is_round, patches_of
 from contactopt.readings.peaks import Peak, Reading, neighbours
 from contactopt.scenes.scene import Scene
 
-LEVEL = 0.9  # least cosine between normals of a zone in space and their mean that has a half-width
 Read = tuple[float, float]  # a distance and its uncertainty
 Reader = Callable[[End], Read | None]
 
@@ -79,7 +76,7 @@ def is_level(problem: InterfaceProblem, frames: np.ndarray, reactions: np.ndarra
     if problem.dim == 2 or not len(normals):
         return True
     mean = normals.mean(axis=0)
-    return bool(np.min(normals @ mean) > LEVEL * np.linalg.norm(mean))
+    return bool(np.min(normals @ mean) > 0.9 * np.linalg.norm(mean))  # least cosine with the mean
 
 
 def _is_ring(scene: Scene, problem: InterfaceProblem) -> bool:
@@ -125,9 +122,7 @@ def contact_zone(
 
 
 def _ends_at_corners(problem: InterfaceProblem, pressure: np.ndarray) -> bool:
-    """Whether the pressure on a line does not fall towards its ends, so that it is the surface that
-    ends there, and not contact by itself.
-    """
+    """Whether pressure on a line does not fall towards its ends: there the surface ends."""
     if problem.dim == 3 or len(pressure) < 2:
         return False
     order = np.argsort(problem.coordinates[0])
@@ -145,10 +140,11 @@ def stick_edge(
     """Read the half-width of the stick zone of one pair, and its uncertainty [length]; `zone` is
     that of contact, where known.
 
-    The slack of the friction bound counts towards the direction in which the nearest slipping node
-    slips. Where contact ends at a corner, the slack over its bound is smooth but not straight: the
-    edge is the mean of what the slack inside and the `slip` (k, dim - 1) of the last step outside
-    read, as uncertain as they differ. A reading off by more than an element is left out.
+    The edge is where the slack of the friction bound is zero, measured in the direction in which
+    the nearest node slips. Where contact ends at a corner there are two readings: one extrapolates
+    the slack over its bound from inside, the other the `slip` (k, dim - 1) of the last step from
+    outside. The edge is their mean, and half their distance is its uncertainty. A reading that is
+    off by more than an element is left out.
     """
     status = contact_status(problem, reactions)
     if not status.stick.any():  # or on less than what belongs to one contact
@@ -227,9 +223,7 @@ def _counted(scene: Scene, problem: InterfaceProblem, inside: np.ndarray) -> flo
 
 
 def _at_centroids(end: End, scene: Scene) -> End:
-    """The end with contacts on a line moved to the centroids of their shape functions, (m - l) / 3
-    beyond a node between linear elements of lengths l and m.
-    """
+    """The end on a line moved to centroids of shape functions: (m - l) / 3 at lengths l and m."""
     if scene.degree != 1 or scene.dim == 3:
         return end
     order = np.argsort(end.distance)
@@ -239,9 +233,7 @@ def _at_centroids(end: End, scene: Scene) -> End:
 
 
 def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float | None:
-    """The zero of sqrt(c^2 - x^2) times a polynomial, fitted to the pressure over that outer share
-    and of that degree with the least standard error of c; None without such a fit.
-    """
+    """The zero of sqrt(c^2 - x^2) times a polynomial, best fitted to the pressure, or None."""
     last = end.distance[end.inside].max()
     if np.sum(end.inside) <= OUTER:  # one contact alone may be at the centre
         return None
@@ -261,9 +253,7 @@ def _end_of_pressure(end: End, pressure: np.ndarray, areas: np.ndarray) -> float
 def _fitted_root(
     x: np.ndarray, p: np.ndarray, weights: np.ndarray, degree: int, far: float
 ) -> tuple[float, float]:
-    """The standard error of c, and c, of the best fit of sqrt(c^2 - x^2) times a polynomial, by
-    Gauss and Newton for c^2; infinity and nan where c is beyond `far`.
-    """
+    """The error of c, and c, of the best fit (Gauss, Newton); infinity and nan beyond `far`."""
     none, square = (np.inf, np.nan), (1 + far) ** 2 / 4
     basis = chebvander(2 * (x - x.min()) / np.ptp(x) - 1, degree) * weights[:, None]
     fit = np.linalg.lstsq(basis * np.sqrt(square - x**2)[:, None], p * weights)[0]
@@ -286,9 +276,7 @@ def _fitted_root(
 
 
 def _directions(problem: InterfaceProblem, r_t: np.ndarray, status: ContactStatus) -> np.ndarray:
-    """Unit vectors (k, dim - 1) of friction at the slipping node nearest to each sticking one, and
-    at the slipping ones themselves. At open ones, which bear no friction, they are zero.
-    """
+    """Unit vectors (k, dim - 1) of friction, in stick of the nearest slip; zero where open."""
     x, slipping = problem.coordinates.T, status.slip
     nearest = np.where(slipping[:, None], r_t, 0.0)
     found = KDTree(x[slipping]).query(x[status.stick])[1]
@@ -313,9 +301,7 @@ def _edges_of(problem: InterfaceProblem, inside: np.ndarray) -> tuple[Peak, ...]
 
 
 def stick_width(reduction: Reduction, solution: Solution, zone: Read) -> Read:
-    """Half-width of the stick zone of a reduction with one pair of surfaces, and its uncertainty
-    [length], beside that of its contact zone.
-    """
+    """Half-width of the stick zone of a single pair, and its uncertainty [length]."""
     problem, r = reduction.problem, solution.reactions
     if not problem.law.sticking(r).any():
         return stick_edge(reduction.scene, problem, r)

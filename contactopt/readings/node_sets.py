@@ -15,8 +15,6 @@ and w one on the unknowns that are held: its slope by U is A w. The displacement
 the adjoint, since w - C A w is the smooth motion of the body under a unit motion of its holder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial, reduce
 from typing import TypeAlias
@@ -44,9 +42,7 @@ Reader: TypeAlias = Callable[[Reduction, Solution], Reading]
 
 
 def node_reading(name: str, rest: str, scene: Scene) -> tuple[Slopes, Reader | None]:
-    """Slopes and reader of the quantity of this module that has a name. InputError for a body,
-    boundary or component that the scene does not have.
-    """
+    """Slopes and reader of a quantity of this module; InputError for what the scene lacks."""
     kind = name.partition(":")[0]
     body, _, boundary = rest.partition(":")
     check_meshed(name, body, scene)
@@ -111,9 +107,7 @@ def _displacement(number: int, boundary: str, axis: int, state: State) -> Seeds:
 
 
 def _held(number: int, boundary: str, axis: int, state: State) -> tuple[np.ndarray, bool]:
-    """(n,) weights of the reactions: one along an axis where something holds the nodes, without
-    what mirror images balance; and whether something does.
-    """
+    """(n,) weights of reactions along an axis, without what images balance; if any holds."""
     body, reduction = _at(state, number), state.reduction
     held, w = np.zeros(len(body.load), dtype=bool), np.zeros(len(body.load))
     for own in body.holders.values():

@@ -6,8 +6,6 @@ disc about its centre, seen as one end, or an ellipse: lengths along its axes ar
 becomes the disc of the same area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,9 +18,6 @@ from contactopt.readings.constants import RING, ROUNDNESS
 
 # distances that differ by less than this fraction of an element belong to one ring of nodes
 SAME = 1e-5
-# between 1, of a disc, and 1.25, of a square: the farthest point over that of a disc
-FARTHEST = 1.12
-ROUNDS = 20  # of that iteration, which gains about two digits in each
 
 # rings of nodes next to the edge: how many are left out, how many are fitted
 Window = tuple[int, int]
@@ -61,17 +56,13 @@ class End:
     free: bool = True
 
     def inner(self, value: np.ndarray, window: Window) -> float | None:
-        """Where value^2, a line in distance^2 through values (k,) inside, is zero [length]; None if
-        it does not fall.
-        """
+        """The zero [length] of value^2, a line in distance^2 through values inside; or None."""
         depth = self.distance[self.inside].max() - self.distance
         square = self._zero(self.distance**2, value[self.contact] ** 2, self.inside, depth, window)
         return float(np.sqrt(square)) if square and square > 0 else None
 
     def outer(self, value: np.ndarray, window: Window) -> float | None:
-        """Where value^(2/3), a line in the distance through values (k,) outside, is zero [length];
-        None as in inner().
-        """
+        """The zero [length] of value^(2/3), a line in the distance, through outer values."""
         depth = self.distance - self.distance[~self.inside].min()
         outside, root = ~self.inside, value[self.contact] ** (2 / 3)
         return self._zero(self.distance, root, outside, depth, window)
@@ -84,9 +75,7 @@ class End:
     def _zero(
         self, x: np.ndarray, y: np.ndarray, side: np.ndarray, depth: np.ndarray, window: Window
     ) -> float | None:
-        """Where the line through y(x) at the rings in the window on one side is zero; None if it
-        does not fall outwards.
-        """
+        """The zero of the line through y(x) at the rings on one side; None if it does not fall."""
         rings = _rings(depth[side], self.step, sum(window))
         skip = max(0, min(window[0], len(rings) - window[1]))
         fitted = rings[skip : skip + window[1]]
@@ -121,9 +110,7 @@ class Patch:
     stretch: float = 1.0
 
     def measure(self, read: Callable[[End], tuple[float, float] | None]) -> Ends | None:
-        """The ends of the patch from the readings of each; None where one cannot be read. Readings
-        count from the centre half-way between the ends, hence the iteration.
-        """
+        """The ends of the patch by the readings of each from its centre, by iteration, or None."""
         x = self.place[self.inside]
         first, last, uncertainty = float(x.min()), float(x.max()), 0.0
         if self.centred:
@@ -132,7 +119,7 @@ class Patch:
                 return None
             step = self.step(self.contact, self.place, last)
             return Ends(-found[0], found[0], self.copies, found[1], step)
-        for _ in range(ROUNDS):
+        for _ in range(20):  # of that iteration, which gains about two digits in each
             centre = (first + last) / 2
             left, right = self._read(-1.0, centre, read), self._read(1.0, centre, read)
             if left is None or right is None:
@@ -173,9 +160,7 @@ class Patch:
 
 
 def least(values: np.ndarray, count: int) -> np.ndarray:
-    """(count,) the places of the least of many values, the least first, and the first ones of equal
-    values. Not all of them are sorted.
-    """
+    """(count,) the places of the least of many values in order, without sorting all."""
     if count < len(values):
         some = np.flatnonzero(values <= np.partition(values, count - 1)[count - 1])
         return np.asarray(some[np.argsort(values[some], kind="stable")[:count]])
@@ -210,9 +195,7 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
 
 
 def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:
-    """Whether a patch and its mirror image are one: no contact lies between them but one on the
-    plane. (That on an axis of revolution has no area, perhaps no force, and does not divide them.)
-    """
+    """Whether a patch and its mirror image are one: only a contact on the plane between them."""
     plane = EQUAL * np.abs(place).max()
     off_plane = np.abs(place[np.abs(place) > plane])
     nearest = np.abs(patch).min()
@@ -231,9 +214,7 @@ def _longest_run(mask: np.ndarray) -> int:
 
 
 def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> Patch | None:
-    """The contacts inside as a disc about their centre of gravity, or as an ellipse that becomes
-    one; None where they are neither.
-    """
+    """The contacts inside as a disc about their centre, or an ellipse that becomes one; or None."""
     x = _from_centre(problem, inside, weights)
     for scaled, stretch in ((x, 1.0), _as_disc(problem, x, inside, weights)):
         distance = np.linalg.norm(scaled, axis=0)
@@ -253,7 +234,7 @@ def is_round(problem: InterfaceProblem, inside: np.ndarray) -> bool:
     x = _from_centre(problem, inside, areas)
     scaled, _ = _as_disc(problem, x, inside, areas)
     disc = np.sqrt(areas[inside].sum() / np.pi)
-    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= FARTHEST * disc)
+    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= 1.12 * disc)  # a disc has 1
 
 
 def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -266,9 +247,7 @@ def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndar
 def _as_disc(
     problem: InterfaceProblem, x: np.ndarray, inside: np.ndarray, weights: np.ndarray
 ) -> tuple[np.ndarray, float]:
-    """Places (2, k) scaled, without a change of areas, so that the second moments of the zone are
-    those of a disc, and the largest factor.
-    """
+    """Places (2, k) scaled at equal area to the moments of a disc, and the largest factor."""
     moments = (x[:, inside] * weights[inside]) @ x[:, inside].T
     if any(problem.chart.mirrored):
         moments = np.diag(np.diag(moments))

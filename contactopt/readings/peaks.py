@@ -5,8 +5,6 @@ meshes: the value at a peak comes from a fit through several nodes, weighted by 
 Every reading says how uncertain it is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 
@@ -109,9 +107,7 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
 
 
 def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:
-    """Numbers of the places whose size (k,) is the largest one around them, MOST_PEAKS at most, the
-    largest first. Rounding does not choose among equal ones.
-    """
+    """Numbers of places whose size is the largest around, the largest first, not by rounding."""
     chosen = np.flatnonzero(sizes >= (1 - EQUAL) * largest)
     order = np.round(sizes[chosen] / (EQUAL * sizes.max(initial=0.0) or 1.0))
     return chosen[np.argsort(-order, kind="stable")[:MOST_PEAKS]]
@@ -129,9 +125,7 @@ def largest_around(problem: InterfaceProblem, sizes: np.ndarray) -> np.ndarray:
 
 
 def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Places (dim - 1, m) of the whole surface with all mirror images and once around closed lines,
-    and the contact of each.
-    """
+    """Places (dim - 1, m) with mirror images, once around closed lines, and their contacts."""
     chart = problem.chart
     if chart.period is None:
         return chart.images()
@@ -167,9 +161,7 @@ def _fitted_top(
 
 
 def _same_side(chart: Chart, contact: int) -> np.ndarray:
-    """Whether contacts (k,) are on the same side as one of them of a surface that is cut at
-    corners, where two contacts have one place; all are on a surface that is not.
-    """
+    """Whether contacts (k,) are on the same side as one of them, of a surface cut at corners."""
     k = chart.places.shape[1]
     place = chart.places[0] + 1j * chart.places[-1]  # one number sorts faster than two
     if chart.cells is None or len(np.unique(place)) == k:
@@ -244,9 +236,7 @@ def _terms(offsets: np.ndarray, powers: list[tuple[int, int]]) -> np.ndarray:
 
 
 def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> np.ndarray:
-    """The terms (1, powers) of a quadratic polynomial at its top, if it has one within half the
-    fitted nodes, else (0, powers); powers as in _fit_to().
-    """
+    """The terms (1, powers) of a quadratic at its top near the nodes, else (0, powers)."""
     H = np.zeros((dim + 1, dim + 1))
     for coefficient, (i, j) in zip(fit, powers):
         H[i, j] += coefficient / 2
@@ -258,9 +248,7 @@ def _stationary(fit: np.ndarray, powers: list[tuple[int, int]], dim: int) -> np.
 
 
 def at_rim(reduction: Reduction, solution: Solution) -> bool:
-    """Whether the largest pressure is at the rim of the candidate surface, where it may be
-    infinite: a node inside has neighbours in all directions.
-    """
+    """Whether the largest pressure is at the rim, where it may be infinite."""
     problem = reduction.problem
     top = int(np.argmax(nodal_pressure(problem, solution)))
     offsets = _surroundings(problem)[0] - problem.chart.places[:, [top]]

@@ -41,9 +41,6 @@ if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
 
 LARGEST = "von_mises"
-# how far beyond the coordinates of a body a point may lie before anything is solved, over its size
-OUTSIDE = 0.05
-DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
 RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
 AROUND = {2: 9, 3: 17}  # vertices among which a local maximum is the largest, itself among them
 NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
@@ -88,9 +85,7 @@ class StressReading(Reading):
 
 
 def place_of(name: object, scene: Scene) -> Place | None:
-    """The quantity at a place that has a name; None for other quantities. InputError for a body,
-    pair, component or point that the scene does not have.
-    """
+    """The quantity at a place, by its name, or None; InputError for what the scene lacks."""
     if not isinstance(name, str):
         return None
     head, at, where = name.partition("@")
@@ -162,7 +157,7 @@ def check_there(name: str, part: Part, region: Region, scene: Scene, meeting: bo
     if region.point:
         corners = straight(mesh).p
         low, high = corners.min(axis=1), corners.max(axis=1)
-        slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)
+        slack = 0.05 * (high - low).max() + (region.radius or 0.0)  # of the body's size
         if np.any(region.point < low - slack) or np.any(region.point > high + slack):
             raise InputError(
                 f"quantity {name!r}: the point ({_words(region)}) lies outside body"
@@ -216,7 +211,7 @@ def read_stress(
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))
-    scatter = DEVIATIONS * recovered.deviation(U, slopes)
+    scatter = 2 * recovered.deviation(U, slopes)  # standard errors hold 95 of 100
     above = sizes + scatter - sizes[top]
     doubtful = (above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0))
     slopes[np.arange(len(slopes)) != top] = 0.0
@@ -234,9 +229,7 @@ def read_stress(
 
 
 def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tuple[int, StressMap]:
-    """The number of the body, and its recovered stress in the region of a quantity as a linear map
-    of the displacement, or the derivative of that map by Poisson's ratio.
-    """
+    """The body's number, and its recovered stress as a map of U, or that derived by nu."""
     number = [part.name for part in reduction.scene.parts].index(place.owner)
     recovered = stress_map(reduction.bodies[number], place.region, by_poisson)
     if recovered is None:
@@ -289,9 +282,7 @@ def pressure_weights(place: Place, reduction: Reduction) -> np.ndarray:
 
 
 def read_place(place: Place, reduction: Reduction, solution: Solution) -> Reading:
-    """Read a quantity at a place, with its uncertainty [stress]: of a pressure what nodes scatter
-    about a linear function. A reading without contact nearby says so.
-    """
+    """Read a quantity at a place, and its uncertainty [stress]: of pressure the scatter."""
     if place.kind != "pressure":
         return read_stress(place, reduction, reduction.displaced(solution))
     weights, problem, r = pressure_weights(place, reduction), reduction.problem, solution.reactions

@@ -22,9 +22,6 @@ from contactopt.problem import Solution
 if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
 
-CLOSED = 1e-3  # a mean direction shorter than this is that of a surface around a body
-TINY = 1e-15  # share of the extent of the contacts below which a motion is rounding
-
 
 class Motion(NamedTuple):
     """How far the upper bodies move beyond the lower ones along a mean direction [length], and by
@@ -36,9 +33,7 @@ class Motion(NamedTuple):
 
 
 def approach(reduction: Reduction, solution: Solution) -> float | None:
-    """How far the plates bring the bodies together along the mean normal [length]; None without a
-    plate, or where normals have no mean.
-    """
+    """How far plates bring bodies together along the mean normal [length]; None without either."""
     if not any(_has_plate(part) for part in reduction.scene.parts):
         return None
     found = motion(reduction, reduction.displaced(solution), 0)
@@ -59,13 +54,14 @@ def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Mo
             out[c] = float(body.carried(int(c))[0] @ U)
     value, size = float(np.sum(weights * moved)), float(np.abs(weights * moved).sum())
     extent = float(np.ptp(reduction.problem.coordinates, axis=1).max(initial=0.0))
-    rounding = max(ROUNDED * size, TINY * extent)
+    rounding = max(ROUNDED * size, 1e-15 * extent)
     return Motion(value if abs(value) > rounding else 0.0, weights)
 
 
 def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
-    """Of each side the bodies count that plates or supports hold or move, component by component,
-    else all. Both sides have one direction, so that no translation of the whole scene counts.
+    """On each side only the bodies count that plates or supports hold or move, component by
+    component; without any, all count. Both sides have one direction, so that no translation of
+    the whole scene counts.
     """
     scene, problem = reduction.scene, reduction.problem
     names = [part.name for part in scene.parts]
@@ -84,7 +80,7 @@ def _weights(reduction: Reduction, component: int) -> np.ndarray | None:
     areas = _of_those(np.asarray(counted), problem.areas)
     mean = _along_symmetry(reduction, areas @ frames / areas.sum(), component)
     length = float(np.linalg.norm(mean))
-    if length < CLOSED:
+    if length < 1e-3:  # a mean direction shorter than this is that of a surface around a body
         return None if component == 0 else made
     if component == 0:
         whole = np.array([areas[own.contacts] @ frames[own.contacts] for own in problem.pairs])

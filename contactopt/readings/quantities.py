@@ -21,8 +21,6 @@ ROWS has one row for each. What it makes, a Quantity, is all that is known of it
 errors, gradients, fits and the command line know of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -75,9 +73,7 @@ class Quantity:
 
 
 def find_quantity(name: object, scene: Scene) -> Quantity:
-    """Find a quantity by its name in this module's head, before anything is solved. InputError for
-    what the scene does not have.
-    """
+    """Find a quantity by a name listed at the top; InputError for what the scene lacks."""
     if not isinstance(name, str):
         raise InputError(f"a quantity is given by its name; got {name!r}.")
     place = place_of(name, scene)
@@ -105,9 +101,7 @@ def unit_of(name: str, units: tuple[str, str]) -> str:
 
 
 def quantity_of_states(name: object, states: Sequence[Scene]) -> Quantity:
-    """As `find_quantity`, for a scene or the states of its load path: InputError also for a
-    quantity of paths where there is one state only.
-    """
+    """As `find_quantity`; InputError for a quantity of paths where there is one state."""
     found = find_quantity(name, states[-1])
     if found.column and len(states) == 1:
         raise InputError(
@@ -118,9 +112,7 @@ def quantity_of_states(name: object, states: Sequence[Scene]) -> Quantity:
 
 
 def seeds_of(quantity: object, state: State) -> Seeds:
-    """The value of a quantity of a solved state and its derivatives, by its name or as a function
-    of the state that returns Seeds.
-    """
+    """The value and derivatives of a quantity of a solved state, by name or as a function of it."""
     if callable(quantity):
         return quantity(state)
     return find_quantity(quantity, state.reduction.scene).slopes(state)
@@ -235,10 +227,14 @@ def _motion(state: State, component: int) -> Seeds:
     found = None
     if approach(reduction, state.solution) is not None or component == 1:
         found = motion(reduction, state.displaced, component)
-    if found is None or not len(state.solution.multipliers):
+    plates = len(state.solution.multipliers)
+    if found is None or not plates:
+        why = (
+            "its surfaces go around a body and have no mean normal" if plates else "it has no plate"
+        )
         raise InputError(
-            f"scene '{reduction.scene.name}' has no plate, hence no approach and no shift, or"
-            " surfaces around a body, which have no mean normal; ask for another quantity."
+            f"scene '{reduction.scene.name}' has no {'shift' if component else 'approach'}, since"
+            f" {why}; ask for another quantity."
         )
     by_r, by_motions, by_U = np.zeros(state.problem.q.shape), [], []
     for body, B, weights in zip(reduction.bodies, reduction.maps, sign * found.weights):

@@ -2,8 +2,6 @@
 space.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -71,9 +69,7 @@ def space_forces(reduction: Reduction, solution: Solution) -> np.ndarray:
 
 
 def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every pair, by name, the resultant of the contact forces on the nodes of its upper body;
-    of the lower one where the upper has none.
-    """
+    """By pair the resultant of contact forces on its upper body, else on the lower one."""
     named = {body.name: body for body in reduction.bodies}
     space, found = space_forces(reduction, solution), {}
     for pair, own, made in zip(reduction.scene.pairs, reduction.problem.pairs, reduction.couplings):
@@ -88,9 +84,7 @@ def pair_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resul
 
 
 def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Resultant]:
-    """For every support and plate the resultant of its forces on the body, by names such as "body
-    'block', support 'bottom'".
-    """
+    """The resultant of every support and plate, as "body 'block', support 'bottom'"."""
     found, displaced = {}, reduction.displaced(solution)
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
         for name, held in held_by(body, U, B.T @ solution.reactions.ravel()).items():
@@ -99,9 +93,7 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
 
 
 def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """The reduction and solution of every pair by itself, for readers of its surface. A view has no
-    displacements of the bodies, since these need the forces of all pairs.
-    """
+    """The reduction and solution of every pair by itself, without displacements of the bodies."""
     if len(reduction.problem.pairs) == 1:
         return [(reduction, solution)]
     made = []

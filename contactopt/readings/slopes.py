@@ -5,8 +5,6 @@ of a half-width by the force at each closed contact are central differences of t
 solve nothing; what the parameters do to the forces is exact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -51,9 +49,7 @@ def of_width(state: State, pair: int) -> Seeds:
 
 
 def of_stick(state: State, pair: int) -> Seeds:
-    """Half-width of the stick zone over that of contact, by forces at closed contacts, slip and
-    bounds, while contacts keep their states. A slipping contact stays at its bound.
-    """
+    """Half-width of stick over contact, by forces, slip and bounds, while states stay the same."""
     reduction, solution = views(state.reduction, state.solution)[pair]
     scene, problem, r = reduction.scene, reduction.problem, solution.reactions
     u, d = problem.displacements(r, solution.multipliers), problem.dim

@@ -167,9 +167,7 @@ def _layer(
 
 
 def _sector(inner: float, outer: float, sweep: float, parts: int, height: float = 1.0) -> Any:
-    """A sector of a ring that ends upright, `parts` elements around, of a height over their length
-    of about `height`.
-    """
+    """A sector of a ring that ends upright, `parts` elements around, about `height` high."""
     angles = np.linspace(np.pi / 2 - sweep, np.pi / 2, parts + 1)
     return ring(even(inner, outer, round(parts * np.pi / sweep / height)), angles)
 

@@ -84,7 +84,7 @@ class Contact:
 
     @property
     def name(self) -> str:
-        """'upper-lower', with a dot before the name of a surface: fit for the name of a file."""
+        """The name of the pair, 'upper-lower', fit for file names: BODY:SURFACE is BODY.SURFACE."""
         return f"{self.upper}-{self.lower}".replace(":", ".")
 
     @property

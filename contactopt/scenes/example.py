@@ -8,9 +8,7 @@ EXAMPLE = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
 
 
 def write_example(path: Path) -> None:
-    """Write an example of a scene file, with a comment on every entry. InputError if its name does
-    not end in .toml, is taken, or cannot be written.
-    """
+    """Write an example of a scene file. InputError for a name that is taken or no .toml."""
     if path.suffix != ".toml":
         raise InputError(f"a scene file's name ends in .toml; got '{path}'.")
     try:

@@ -49,8 +49,8 @@ def usual_distance(meshes: Mapping[str, Any]) -> float:
 def facing_boundaries(meshes: Mapping[str, Any], distance: float) -> list[Facing]:
     """The pairs of boundaries of different bodies that face each other within a distance [length].
 
-    `meshes` are the bodies' by their names, with the boundaries that may touch. Of boundaries that
-    overlap those are taken that face each other with the largest share of their areas.
+    `meshes` are the bodies' by their names, with the boundaries that may touch. Where
+    boundaries overlap, the ones that face each other with the largest share of their areas count.
     """
     found = []
     names = [name for name, mesh in meshes.items() if mesh.boundaries]

@@ -49,9 +49,7 @@ class FileContext:
     found: list[Facing] | None = None
 
     def at_state(self, values: list[float]) -> float:
-        """The number of the present state: within a step it grows from that at the end of the step
-        before, at first from zero.
-        """
+        """The number of the present state, grown from that at the end of the last step."""
         if not self.steps or len(values) == 1:
             return values[min(self.state, len(values) - 1)]
         left = self.state
@@ -77,9 +75,7 @@ class FileContext:
     def numbers(
         self, table: Table, whole: bool = False, keys: tuple[str, ...] = ()
     ) -> dict[str, float]:
-        """The numbers of components, or of other `keys`, in a table, of the present state; `whole`:
-        it holds no others.
-        """
+        """The present numbers of `keys` in a table; `whole`: it holds no others."""
         found = {}
         for key in keys or self.components:
             there = table.has(key, float, list)

@@ -51,7 +51,7 @@ class MatrixPart:
                  or 9 in space
     fixed        numbers of the unknowns that are held, or a mapping from numbers to displacements
                  [length]
-    supports     Support objects on surfaces in `facets`, instead of `fixed` or beside it
+    supports     Support objects on surfaces in `facets`, instead of `fixed` or besides
     loads        Plate objects on surfaces in `facets`; all other loads are in f
     contact      the name of the candidate contact surface; a Contact can name others
     order        'node': the unknowns of a point follow each other; 'component': all x come first,

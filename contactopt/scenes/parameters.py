@@ -188,7 +188,7 @@ class Parameter:
 
 
 def parameter(name: object, scene: Scene) -> Parameter:
-    """Find one parameter of a scene by its name, in the form that this module's head lists.
+    """Find one parameter of a scene by its name, in a form listed at the top.
 
     InputError if the name is unknown or what it names does not enter the scene.
     """

@@ -228,9 +228,7 @@ def _round_bodies(
     materials: tuple[Material, Material],
     load: Plate,
 ) -> tuple[Part | Rigid, Part | Rigid]:
-    """Half disc of a radius and the foundation, half as wide and high as given, with the load from
-    above; the first component is zero on an axis of symmetry.
-    """
+    """Half disc and foundation, half as wide and high as given, and the load from above."""
     radius, width, height = size
     widest = min(0.9 * radius / sqrt(2), width) / MARGIN
     if hertz.half_width >= widest:

@@ -318,9 +318,7 @@ class Scene:
 
 
 def check_units(units: object) -> None:
-    """Raise InputError unless these are the names of a unit of length and of one of stress. A name
-    that is known but for its capital letters would not be known.
-    """
+    """Raise InputError unless these are the names of units of length and of stress."""
     if not isinstance(units, (tuple, list)) or len(units) != 2:
         raise InputError(
             f"the units of a scene are two names, as in ('mm', 'MPa'); got {short(units)}."

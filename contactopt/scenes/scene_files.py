@@ -86,7 +86,7 @@ def read_scene_file(path: str | Path, changes: Mapping[str, Any] | None = None) 
 def read_scenes(
     table: Callable[[], Table], path: Path
 ) -> tuple[tuple[Scene, ...], dict[str, Any], dict[str, int | str]]:
-    """As read_scene_file(), from a function that makes the table anew: states, options, lines."""
+    """As read_scene_file(), from a function that makes the table again: states, options, lines."""
     top = table()
     first, solve, reading = _scene(path, top, None)
     longest = max((length for length, _, _ in reading.lengths), default=1)
@@ -224,9 +224,7 @@ def _found(top: Table, parts: list[Any], reading: FileContext) -> list[Table]:
 
 
 def _free(part: Part) -> Mesh:
-    """The mesh of a part with those boundaries that share no facet with those of supports and
-    loads, and are not the whole surface where there are others.
-    """
+    """The mesh with those boundaries that share no facet with those of supports and loads."""
     named = {name: np.asarray(own) for name, own in (part.mesh.boundaries or {}).items()}
     holders: tuple[Support | Load, ...] = (*part.supports, *part.loads)
     used = [named[own.boundary] for own in holders if own.boundary in named]

@@ -1,7 +1,5 @@
 """What may be left out of a scene, as a report with the simplified scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -13,7 +11,6 @@ from contactopt.simplification.proof import Fold
 from contactopt.solving.solve_scene import Solved
 
 PARTS = {2: "half", 4: "quarter", 8: "eighth"}
-ROUNDING = 1e-10  # a smaller change between two solutions is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +25,8 @@ class Simplification:
     scene     the simplified scene
     folds     how the scene that it is applied to lies on the simplified one, where both have the
               same answer; else empty
-    proof     certificate of the whole with what the simplified scene says of it; None where it was
-              not computed
+    proof     certificate of the whole scene with the answer of the simplified one; None where it
+              was not computed
     error     relative error of a simplification that is not exact
     check     function of the solved simplified scene that says in a sentence whether what was
               assumed holds; None where nothing was assumed
@@ -48,20 +45,20 @@ class Simplification:
 
     @property
     def exact(self) -> bool:
-        """Whether the certificate of the whole proves that its answer is that of the whole."""
+        """Whether the whole scene's certificate proves that both scenes have the same answer."""
         return self.proof is not None and self.proof <= PROVED
 
     @property
     def price(self) -> str:
         """What it leaves, and what the error is, in words."""
         if self.exact:
-            error = f"no error: the certificate of the whole is {self.proof:.0e}"
+            error = f"no error: the certificate of the whole scene is {self.proof:.0e}"
         elif self.folds:
             error = "no error, but not proved"
         else:
             error = (
                 f"error about {self.error:.1e}"
-                if self.error > ROUNDING
+                if self.error > 1e-10  # a smaller change between two solutions is rounding
                 else "no error on the coarse mesh"
             )
         (n, k), (m, c) = self.before, self.after

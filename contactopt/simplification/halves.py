@@ -88,9 +88,7 @@ def _restricted(mesh: Mesh, elements: np.ndarray) -> Any:
 
 
 def roller(whole: Whole) -> str:
-    """A support that holds a component of contacts in a plane across it, or none: it would be a
-    plane of symmetry in a scene of mirror images (contactopt.coupling.planes_of_symmetry).
-    """
+    """A support that holds a component of contacts in a plane across it, or none."""
     for name, part in whole.parts.items():
         mesh = whole.meshes[name]
         facets = [mesh.boundaries[surface] for surface in whole.scene.surfaces_of(part)]

@@ -5,8 +5,6 @@ The plane lies in the middle between the outermost nodes, across an axis of spac
 principal axis of the nodes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -67,7 +65,7 @@ def _why(images: Images) -> str:
     """Why one half is enough, and what the numbers of the half stand for."""
     text = (
         f"Meshes, supports, loads, gaps and laws are their own mirror images. {UNIQUE} Forces and"
-        " areas stay those of the whole"
+        " areas stay those of the whole scene"
     )
     if any(name != image for name, image in images.pairs.items()):
         return f"{text}; a contact that stands for itself and its image carries the forces of both."

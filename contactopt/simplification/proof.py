@@ -46,9 +46,8 @@ Fold = Callable[[Key, np.ndarray], tuple[Key, np.ndarray, np.ndarray]]
 def certificate_of_whole(
     whole: Scene, elements: int, zone: float | None, part: Solved, folds: Sequence[Fold]
 ) -> float:
-    """How far the whole is from solved by what the part's solution says of it: the largest error in
-    this module's head [-]; infinite where something of the whole has no place in the part. `folds`
-    say how the whole lies on it.
+    """The largest error of the whole scene with the answer of the part, as defined at the top [-];
+    infinite where something of the whole scene is not in the part. `folds` map it to the part.
     """
     bodies: dict[str, Any] = {}
     for each in whole.parts:

@@ -1,7 +1,5 @@
 """The search through all kinds of simplification, the exact ones first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -57,9 +55,7 @@ def simplify(scene: Scene, solve: bool = True) -> Simplified:
 
 
 def proved_part(scene: Scene, options: Options) -> tuple[Simplified, Solved | None]:
-    """What is left of a scene after all simplifications that are proved, and its solution on that
-    scene's own mesh, or None. The note of the options is told what was found.
-    """
+    """What all proved simplifications leave of a scene, solved on its own mesh, or None."""
     notes: list[str] = []
     chain: list[Simplification] = []
     part = None

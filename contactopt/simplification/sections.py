@@ -1,10 +1,10 @@
 """Solids that one section in plane strain describes: prisms whose ends are held along their axis.
 
-Of hexahedra in layers between two planes across an axis of space, the section is the faces on one
-of them. If these planes are held along the axis and nothing else changes or acts along it, strain
-is plane, and section and solid have the same discrete solution. Tetrahedra share forces out
-unevenly along the axis, and what a section says of them cannot be proved; nor can a mesh of a body
-of revolution, which is a polygon.
+If a solid has hexahedra in layers between two planes across an axis of space, its section is made
+of the faces on one plane. If these planes are held along the axis and nothing else changes or
+acts along it, strain is plane, and section and solid have the same discrete solution. Tetrahedra
+share forces out unevenly along the axis, so that nothing can be proved about their section. The
+same is true of a mesh of a body of revolution, which is a polygon.
 """
 
 from __future__ import annotations

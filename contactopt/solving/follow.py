@@ -2,8 +2,6 @@
 (contactopt.solving.paths).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sized
 from dataclasses import replace
 from typing import Any
@@ -100,9 +98,7 @@ def follow_path(
 def _next_state(
     scene: Scene, named: str, solved: Solved, states: list[State], options: Options
 ) -> Solved:
-    """The next state of a path; an InputError names it, and a load that nothing holds comes with
-    the path so far.
-    """
+    """The next state of a path; errors name it, or bring the path so far."""
     try:
         return solve_loaded(scene, solved, states[-1].displacements[:, 1:], options)
     except InputError as error:

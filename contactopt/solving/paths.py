@@ -19,8 +19,6 @@ step in energy: second order in its size, zero where neither contact nor the dir
 slip change.
 """
 
-from __future__ import annotations
-
 import csv
 from collections import Counter
 from collections.abc import Mapping
@@ -110,9 +108,7 @@ class PathResult:
 
     @property
     def solution(self) -> Solution:
-        """The last state's, with the seconds of the whole path. Where a step failed, it says how:
-        status, residual, message and iterations are those of that step.
-        """
+        """The last state's solution with the seconds of the path, or how its last step failed."""
         seconds: Counter[str] = Counter()
         for own in self.solutions:
             seconds.update(own.seconds)
@@ -139,9 +135,7 @@ class PathResult:
         return [*(state.solution for state in self.states), *failed]
 
     def problem(self, step: int) -> InterfaceProblem:
-        """The static problem of one step, with its gaps and resultants, which its solution is
-        certified against. Steps count from 0.
-        """
+        """The static problem of one step, counted from 0, that certifies its solution."""
         return replace(self.reduction.problem, q=self.states[step].q, s=self.states[step].s)
 
     @cached_property
@@ -173,16 +167,12 @@ class PathResult:
         return history
 
     def fields(self, step: int) -> tuple[Fields, ...]:
-        """Displacement and stress of each elastic body at a state; none where it keeps no
-        displacements.
-        """
+        """Displacement and stress of each elastic body at a state; none if not kept."""
         pairs = zip(self.reduction.bodies, self.states[step].bodies)
         return tuple(found for body, U in pairs if (found := fields(body, U)) is not None)
 
     def write_history(self, file: Path) -> None:
-        """Write the history as comma-separated values, one row per state, with the names of the
-        steps of the path in its last column.
-        """
+        """Write the history as CSV, one row per state, the path's step in the last."""
         with open(file, "w", newline="") as opened:
             rows = csv.writer(opened)
             history: dict[str, Any] = dict(self.history)

@@ -2,8 +2,6 @@
 is left.
 """
 
-from __future__ import annotations
-
 import math
 import resource
 import sys
@@ -43,9 +41,7 @@ def progress_lines(
 
 
 def remaining(steps: list[tuple[float, float]], tol: float) -> str:
-    """ ", about T s left", from the seconds spent and the residual after each of the last two steps
-    of a solve that ends at tol; nothing where the residual did not fall or is small enough.
-    """
+    """ ", about T s left", from the last two residuals; nothing where they do not fall."""
     if len(steps) < 2:
         return ""
     (start, old), (end, new) = steps[-2:]

@@ -6,8 +6,6 @@ above the tolerance the state is solved. Therefore a scene may be changed in bet
 some pair of surfaces has kept its name.
 """
 
-from __future__ import annotations
-
 import time
 import zipfile
 from collections.abc import Callable, Sequence
@@ -27,7 +25,6 @@ from contactopt.problem.transfer import transfer
 FILE = "restart.npz"
 START = "start"  # the method of a solution that another run has found
 PATIENCE = 5.0  # seconds between two writings of the file, at least
-SHARE = 20.0  # of the time at most one part in so many is spent on writing
 Point = tuple[np.ndarray, np.ndarray]  # reactions (k, dim) [force], multipliers (p,) [length]
 
 
@@ -55,9 +52,7 @@ class Known:
     complete: bool
 
     def start(self, state: int, reduction: Reduction) -> Solution | None:
-        """The forces of a state, the last one for -1, at the contacts of a reduction: those of
-        pairs of the same name, interpolated in space; none for a state that is not known.
-        """
+        """The forces of a state at the contacts of a reduction, interpolated in space, or None."""
         if state >= len(self.reactions):
             return None
         problem, r = reduction.problem, self.reactions[state]
@@ -160,9 +155,7 @@ class Restart:
     pause: float = PATIENCE
 
     def begin(self, reduction: Reduction) -> None:
-        """A state of this reduction will be solved. On another mesh than the one before it is the
-        first state.
-        """
+        """A state of this reduction will be solved, the first one on a new mesh."""
         if self.reduction is None or reduction.couplings is not self.reduction.couplings:
             self.done = []
         self.reduction, self.now = reduction, None
@@ -185,7 +178,7 @@ class Restart:
         if self.file is not None and begin - self.written > self.pause:
             replace_file(self.file, self.save)
             self.written = time.perf_counter()
-            self.pause = max(PATIENCE, SHARE * (self.written - begin))
+            self.pause = max(PATIENCE, 20.0 * (self.written - begin))  # a twentieth of the time
 
     def finished(self, solution: Solution) -> None:
         """The present state is solved."""

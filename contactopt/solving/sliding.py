@@ -1,7 +1,5 @@
 """Whether a state that was not solved slides: friction cannot bear its load, whatever sticks."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +9,6 @@ from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.problem.unbalanced_loads import escape
 from contactopt.scenes.scene import Scene
-
-NEAR = 0.9  # share of what friction bears from which on a state without a sticking contact slides
 
 
 class Sliding(NamedTuple):
@@ -27,8 +23,9 @@ class Sliding(NamedTuple):
 
 
 def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None) -> Sliding | None:
-    """The free motion along which the load is more than friction bears, in a state that ended
-    without a solution, after a solved one, if any.
+    """The free motion along which the load exceeds what friction can hold; None without any.
+
+    The state `ended` without a solution; `before` is the solved state before it, if any.
 
     With unit displacements V of the contacts in a motion, the load along it has to meet the normal
     forces, sum V_n r_n, and the friction, at most sum b |V_t|, b the bounds of r_n.
@@ -48,7 +45,7 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
         load = np.abs(problem.s + r_n @ V[:, 0])
         slips = not contact_status(problem, ended.reactions).stick.any()
         worst = int(np.argmax(load - most))
-        if load[worst] > (NEAR if slips else 1.0) * most[worst] > 0:
+        if load[worst] > (0.9 if slips else 1.0) * most[worst] > 0:  # of what friction bears
             name = problem.motions[worst] if problem.motions else f"motion {worst + 1}"
             held = float(most[worst]) if own is before else np.nan
             found = found or Sliding(name, float(load[worst]), held)
@@ -88,9 +85,7 @@ def unheld_words(
 
 
 def sliding_words(found: Sliding, scene: Scene, state: str, before: str) -> str:
-    """One sentence on a state that slides, after the state `before`; without one the forces are
-    known too badly to say what friction holds.
-    """
+    """One sentence on a state that slides, after the state `before`, unless that is none."""
     force, most = _unit(scene, found.motion), float(f"{found.most:.3g}")
     load = f"the load along {found.motion} is {found.load:.6g} {force}"
     held = "more than friction holds"

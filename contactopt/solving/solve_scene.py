@@ -4,8 +4,6 @@ Whatever solves scenes is a loop around the two functions of this module: the co
 paths (contactopt.solving), and refinement (contactopt.accuracy).
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections import Counter
@@ -27,7 +25,16 @@ from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.transfer import transfer
-from contactopt.readings.constants import BALANCED, BEARABLE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
+from contactopt.readings.constants import (
+    BALANCED,
+    BEARABLE,
+    BORNE,
+    COARSEST,
+    FACTOR,
+    ROUGH,
+    ROUNDS,
+    SLOW,
+)
 from contactopt.readings.validity import validity
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
@@ -38,7 +45,7 @@ from contactopt.solving.sliding import sliding, sliding_words
 Note = Callable[[str], None]
 log = logging.getLogger(__name__)
 # Steps of the default method, of which those of Newton and along interior paths are some forty,
-# until it is asked whether a state slides. One that does not begins anew, without this bound.
+# until it is asked whether a state slides. One that does not starts again, without this bound.
 FIRST_TRY = 64
 STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselves
 
@@ -165,9 +172,7 @@ def _one_way(
     once: bool,
     made: Posed,
 ) -> Solved:
-    """The scene whose bodies are `made` solved by the way that the options name, or the cheapest
-    one; TooDear where that takes many more steps than expected.
-    """
+    """The scene with `made` bodies, solved by the named or cheapest way; TooDear if it is slow."""
     reduction = reduce_bodies(
         scene, elements, zone, options.Q, options.solver, once=once, made=made
     )
@@ -248,9 +253,7 @@ def _solved(
 
 
 def _knowing(reduction: Reduction, solution: Solution, tol: float) -> Reduction:
-    """With a Q that need not look for the displacements again that came with the forces of the
-    solution. Where the solution was to be less accurate than usual, so are they.
-    """
+    """With a Q that knows the displacements of the solution, as accurately as it was asked for."""
     problem = reduction.problem
     if solution.displacements is None:
         return reduction
@@ -271,15 +274,13 @@ def _on_ground(
     start: Solution | None,
     answer: Callable[[InterfaceProblem, Solution | None], Solution],
 ) -> tuple[Reduction, Solution]:
-    """The answer for thin bodies, which a ground holds until it bears nothing or no longer gets
-    less to bear.
-    """
+    """The answer for thin bodies, held by a ground until it bears nothing or no less."""
     before = np.inf
     solution = answer(held.problem, start)
     seconds = Counter(solution.seconds)
     for _ in range(ROUNDS):
         left = _doubt(held, solution)
-        if left <= BALANCED or left > SLOW * before or not solution.solved:
+        if left <= BORNE or left > SLOW * before or not solution.solved:
             break
         held, before = held.pulled(solution), left
         solution = answer(held.problem, solution)

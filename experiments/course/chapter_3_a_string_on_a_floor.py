@@ -473,9 +473,9 @@ answer = ...  # condition number [-]
 check("3.9", answer)
 
 # %% [markdown]
-# **3.10** (Program.) Only the middle one of three nodes touches the floor. The string has four
-# elements of $L = 1$ mm and $T = 1$ N. What is the condition number of the stiffness form with a
-# spring of 700 N/mm at this node?
+# **3.10** (Program.) The string of this chapter ($L = 1$ mm, $T = 1$ N) is divided into four
+# elements. Only the middle one of its three free nodes touches the floor. What is the condition
+# number of the stiffness form with a spring of 700 N/mm at this node?
 
 # %% tags=["exercise"]
 answer = ...  # condition number [-]

@@ -64,9 +64,11 @@ def product_of_two(
     return None
 
 
-def quantity(answer: float, given: dict[str, float], formula: str) -> str | None:
-    """What is told of an answer that is made of the given quantities: a sum, a difference, or
-    a product of powers with a simple factor.
+def quantity(
+    answer: float, given: dict[str, float], formula: str, counts: bool = False
+) -> str | None:
+    """What is told of an answer that is made of the given quantities: a sum, a difference, or,
+    unless it is a count, a product of powers with a simple factor.
     """
     known = {name: number for name, number in given.items() if number}
     if not known or len(known) > MOST_QUANTITIES:
@@ -74,6 +76,8 @@ def quantity(answer: float, given: dict[str, float], formula: str) -> str | None
     for number, told in _sums(formula, tuple(known.items())):
         if fits(answer, number):
             return told
+    if counts:
+        return None  # some product is near any whole number
     known = {name: number for name, number in known.items() if abs(number) not in (1.0, 2.0)}
     exponents: tuple[float, ...] = (0, 1, -1, 2, -2) if len(known) <= 4 else (0, 1, -1)
     exponents += (0.5, -0.5) if len(known) <= 3 else ()

@@ -61,6 +61,7 @@ TAKEN = (
         for n in (-3, -2, -1, 1, 2, 3)
     ),
 )
+COMPONENTS = "components"  # name of the number of components that a force has in space
 WRONG_SIDE = "`{}` stands on the wrong side of a fraction"
 
 
@@ -197,6 +198,8 @@ def misread(
             {name: old[name] for name in names},
             f"This has the {told} of the text. The exercise gives another number.",
         )
+    if given.get(COMPONENTS) == 3:
+        yield {COMPONENTS: 2.0}, "a force has two components, as in the plane"
     for name, number in given.items():
         yield {name: -number}, f"the sign of `{name}` is wrong"
         yield {name: 0.0}, f"`{name}` is left out everywhere"
@@ -283,10 +286,12 @@ def _changed_operation(
             flipped = ast.Sub() if isinstance(op, ast.Add) else ast.Add()
             yield ast.BinOp(left, flipped, right), f"the sign of `{second}` is wrong"
             yield left, f"`{second}` is left out"
-            yield right, f"`{first}` is left out"
             if isinstance(op, ast.Add):
+                yield right, f"`{first}` is left out"
                 sides = f"`{first}` and `{second}` are taken for the sides of a right angle"
                 yield ast.Call(ast.Name("hypot", ast.Load()), [left, right], []), sides
+            else:
+                yield right, f"`{second}` is not subtracted from `{first}`"
             if isinstance(right, ast.BinOp) and isinstance(right.op, ast.Pow):
                 whole = ast.BinOp(ast.BinOp(left, op, right.left), right.op, right.right)
                 yield whole, f"the exponent of `{ast.unparse(right.left)}` stands outside a bracket"

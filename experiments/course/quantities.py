@@ -146,6 +146,8 @@ class Numbers:
             return wrong("count", "A count is a whole number.")
         if self.counts and abs(answer - right) == 1:
             return wrong("count", "It is one too many or one too few. Look at the ends again.")
+        if self.counts and right > 99 and answer in shortened(right, 2):
+            return wrong("count", "The first digits are right, but a count is exact.")
         return (
             _scaled(answer, right, self.agrees_alone)
             or (None if self.counts else _scaled(answer, right, _same_digits, SCALED[:-2]))
@@ -233,7 +235,7 @@ class Numbers:
         formula, given = self._formula(i), tuple(self.given.items())
         for change, besides in BESIDES:
             for number, told in wrong_values(formula, given, tuple(self.chapter.items())):
-                alone = "of the text" in told or "right answer" in told
+                alone = any(w in told for w in ("of the text", "right answer", "Perhaps"))
                 if number and not alone and fits(answer, change(number)):
                     return wrong("formula", f"{told} {besides}")
         for number, told in two_mistakes(formula, given):
@@ -252,7 +254,7 @@ class Numbers:
         """Whether an answer is another number of the exercise, or made of its numbers."""
         if answer == 0:
             return wrong("zero", "Zero would mean that nothing acts here. Look at the loads again.")
-        told = quantity(answer, self.given, self._formula(i))
+        told = quantity(answer, self.given, self._formula(i), self.counts)
         return wrong("combination", told) if told else None
 
     def _place(self, answer: float, i: int) -> Verdict | None:

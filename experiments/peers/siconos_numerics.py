@@ -37,13 +37,12 @@ def version():
 
 
 def prepare(problem, tol, settings):
-    import tempfile
-
     import numpy as np
+    import scipy.sparse as sp
     import siconos.numerics as sn
 
     q, blocks, columns = problem["q"], problem["data"], problem["indices"]
-    (k, dim), size, number = q.shape, q.size, len(columns)
+    (k, dim), size = q.shape, q.size
     options = sn.SolverOptions(getattr(sn, f"SICONOS_FRICTION_{dim}D_" + settings["solver"]))
     options.dparam[sn.SICONOS_DPARAM_TOL] = tol
     options.iparam[sn.SICONOS_IPARAM_MAX_ITER] = 1000000
@@ -64,24 +63,19 @@ def prepare(problem, tol, settings):
         Q[np.repeat(np.arange(k), np.diff(problem["indptr"])), columns] = blocks
         Q = np.asfortranarray(Q.swapaxes(1, 2).reshape(size, size))
         made = sn.FrictionContactProblem(2, k, Q, q.ravel(), problem["mu"])
-        return sn.fc2d_driver, made, r, np.zeros(size), options
-    ends = 3 * np.arange(1, k + 1)
-    numbers = [3, k, 1, size, size, number, k, k, *ends, *ends, k + 1, number]
-    numbers += [*problem["indptr"], *columns]
-    for i, block in enumerate(blocks):
-        numbers += [i, *block.T.ravel().tolist()]
-    numbers += [*q.ravel().tolist(), *problem["mu"].tolist()]
-    with tempfile.NamedTemporaryFile("w", suffix=".dat") as file:
-        file.write("\n".join(map(str, numbers)))
-        file.flush()
-        made = sn.frictionContact_new_from_filename(file.name)
-    return sn.fc3d_driver, made, r, np.zeros(size), options
+        return sn.fc2d_driver, made, r, np.zeros(size), options, Q
+    Q = sp.csc_matrix(sp.bsr_matrix((blocks, columns, problem["indptr"]), shape=(size, size)))
+    Q.indices, Q.indptr = Q.indices.astype(np.int64), Q.indptr.astype(np.int64)
+    _, blocked = sn.SBM_from_csparse(3, Q)
+    matrix, data = sn.NM_new_SBM(size, size, blocked), (q.ravel(), problem["mu"])
+    made = sn.frictionContactProblem_new_with_data(3, k, matrix, *data)
+    return sn.fc3d_driver, made, r, np.zeros(size), options, (blocked, matrix, data)  # kept alive
 
 
 def solve(prepared):
     import siconos.numerics as sn
 
-    driver, made, r, v, options = prepared
+    driver, made, r, v, options, _ = prepared
     info = driver(made, r, v, options)
     return r, info == 0, options.iparam[sn.SICONOS_IPARAM_ITER_DONE]
 

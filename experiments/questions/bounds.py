@@ -339,7 +339,9 @@ def _halved(points: np.ndarray, halvings: int) -> tuple[Any, np.ndarray]:
     """A mesh of a simplex with vertices (dim, dim + 1), and the facets opposite the last one."""
     kind = skfem.MeshTri if len(points) == 2 else skfem.MeshTet
     plain = kind.init_refdom().refined(halvings)
-    mesh = kind(points[:, 1:] @ plain.p + points[:, :1], plain.t)  # may number facets anew
+    mesh = kind(
+        points[:, 1:] @ plain.p + points[:, :1], plain.t
+    )  # may change the numbers of facets
     return mesh, np.flatnonzero(np.all(plain.p[-1, mesh.facets] < 1e-9, axis=0))
 
 

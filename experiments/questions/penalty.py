@@ -76,8 +76,8 @@ def recipes() -> list[Row]:
     """What a factor costs in penetration, slip, pressure and friction, and after some iterations.
 
     Everything is compared with multipliers on the same mesh: penetration over the height of the
-    cylinder at the edge of contact, slip of sticking nodes over the largest slip, the rest over
-    itself.
+    cylinder at the edge of contact, slip of sticking nodes over the largest slip; the other errors
+    are relative.
     """
     rows = []
     for elements in MESHES:

@@ -6,8 +6,6 @@ gap / step, H the contact velocities of the bodies' velocities. More contact com
 freedom: W is sparse and of deficient rank.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -51,9 +49,7 @@ def parts_of_packing(
     disorder: float = 0.3,
     spin: float = 0.0,
 ) -> tuple[sp.csr_array, np.ndarray, np.ndarray, np.ndarray]:
-    """W of a packing; contact velocities (m, dim) that gravity makes in the step, and random ones;
-    gaps (m,). The arguments are those of `packing`.
-    """
+    """W, contact velocities (m, dim) that gravity makes in the step, random ones, and gaps (m,)."""
     if dim not in (2, 3) or bodies < 2**dim or points < 1:
         raise InputError("packing needs dim 2 or 3, at least 2^dim bodies, and points at least 1.")
     rng = np.random.default_rng(seed)

@@ -2,8 +2,6 @@
 one structure. A state may depend on the answer to the last one, which is computed here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -70,9 +68,7 @@ def settling(
     points: int = 1,
     warm: bool = False,
 ) -> Sequence:
-    """A shaken packing that comes to rest under its weight: implicit steps of time of length one,
-    with the contacts of its first place; each step begins with the velocities of the last one.
-    """
+    """A shaken packing that comes to rest: implicit steps of time one at its first contacts."""
     W, fall, shaken, gaps = parts_of_packing(dim, bodies, seed, points=points)
     velocity, law = shaken, Coulomb(np.full(len(gaps), mu))
 

@@ -2,8 +2,6 @@
 one that was made on another machine is known again.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -67,9 +65,7 @@ def _short(value: float) -> float | None:
 
 
 def invariants(given: InterfaceProblem | Sequence) -> dict[str, float]:
-    """Norms of q, Q x, V' x (x_i = cos i), s and mu, of all states, to ten digits, which rounding
-    keeps.
-    """
+    """Norms of q, Q x, V' x (x_i = cos i), s and mu, of all states, to ten digits."""
     states = states_of(given)
     x = np.cos(np.arange(states[0].q.size))
     parts = {

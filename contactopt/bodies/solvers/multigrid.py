@@ -15,8 +15,6 @@ Sources: Vanek, Mandel, Brezina (1996), Algebraic multigrid by smoothed aggregat
 fourth order elliptic problems; Lottes (2023), Optimal polynomial smoothers for multigrid V-cycles.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from threading import Lock
 from typing import NamedTuple
@@ -222,9 +220,7 @@ def _dot(x: np.ndarray, y: np.ndarray) -> float:
 def _coarsen(
     A: sp.bsr_matrix, modes: np.ndarray, points: np.ndarray
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """Prolongation from the aggregates of nodes, and the modes (n, j), represented exactly, and
-    points (dim, nodes) of these; A is in blocks of nodes.
-    """
+    """Prolongation from aggregates of nodes, which represents the modes, and their points."""
     try:
         with IMPORTING:
             from pyamg.aggregation.aggregate import standard_aggregation
@@ -265,9 +261,7 @@ def _smoothed(
 
 
 def _near(A: sp.bsr_matrix, points: np.ndarray) -> np.ndarray:
-    """Marks the blocks of A of near neighbours among its nodes at points (dim, k): at no more than
-    NEAR times the distance of the nearest one of either, and of itself.
-    """
+    """Marks blocks of A of nodes within NEAR times the distance of the nearest one of either."""
     row, column = _rows_of(A), A.indices
     distance = np.zeros(len(row))
     for x in points:

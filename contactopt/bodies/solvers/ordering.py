@@ -10,8 +10,6 @@ Sources: George (1973), Nested dissection of a regular finite element mesh, SIAM
 Trans. Math. Softw. 11, 141-153.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -70,8 +68,8 @@ def nested_dissection(graph: sp.csr_matrix, points: np.ndarray) -> np.ndarray:
     """Permutation (n,) that eliminates both halves of a mesh before the nodes that separate them,
     and each half likewise.
 
-    Of the median planes across the axes the one with the fewest separating nodes cuts the nodes at
-    points (dim, n), whose graph (n, n) is a symmetric pattern.
+    The nodes at points (dim, n) are cut by the median plane, across one of the axes, that has the
+    fewest separating nodes. Their graph (n, n) is a symmetric pattern.
     """
     blocks = list(_dissected(graph, points))
     return np.concatenate(blocks[::-1]) if blocks else np.zeros(0, dtype=np.intp)
@@ -164,9 +162,7 @@ def _dissected(graph: sp.csr_matrix, points: np.ndarray) -> Iterator[np.ndarray]
 
 
 def _cut(graph: sp.csr_matrix, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mask of the nodes left of the separator, and of the separator: nodes left of the median of x
-    that touch its right.
-    """
+    """Masks of the nodes left of a separator, and of it: what touches the right of the median x."""
     below = np.zeros(len(x), dtype=bool)
     below[np.argsort(x, kind="stable")[: len(x) // 2]] = True
     separator = below & (graph @ (~below).astype(np.int8) > 0)

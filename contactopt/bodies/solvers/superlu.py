@@ -1,7 +1,5 @@
 """Sparse factors by SuperLU, and how to use no more of them than a load reaches."""
 
-from __future__ import annotations
-
 import weakref
 from _thread import start_new_thread
 from concurrent.futures import ThreadPoolExecutor
@@ -48,9 +46,7 @@ def _free(executor: ThreadPoolExecutor, held: list[Any]) -> None:
 
 
 def factorise(A: sp.csc_matrix) -> Any:
-    """Factors of a symmetric positive definite matrix in its own order without pivoting;
-    MemoryError, with a sentence, if they do not fit, RuntimeError if A is singular.
-    """
+    """Factors of a positive definite matrix in its order; MemoryError, RuntimeError if singular."""
     try:
         return splu(A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except (MemoryError, RuntimeError) as error:
@@ -105,9 +101,7 @@ class SuperLUSolver(BodySolver):
         return L * np.sqrt(pivots), factors.perm_c[head:] - head
 
     def restricted(self, at: np.ndarray) -> Product:
-        """Products by only the rows and columns of L and D that `at` reaches in the elimination
-        tree; in space they hold most of L, and whole solves are used.
-        """
+        """Products by the rows and columns of L and D that `at` reaches in the plane."""
         factors = self.factors
         if not self._plane or not np.array_equal(factors.perm_c, factors.perm_r):
             return super().restricted(at)

@@ -21,7 +21,6 @@ from contactopt.errors import InputError
 from contactopt.linear.deadline import TimeUp, check_time, time_left
 
 Answer = tuple[np.ndarray, np.ndarray]  # what a bridge returns: forces, multipliers
-FIRST = 10  # iterations of the first try of a backend whose iterations are its only limit
 TIGHT = 1e-9  # accuracy asked of every backend, in dimensionless units
 
 
@@ -56,13 +55,11 @@ class Backend:
         return dict(self.settings) | ({self.clock: left} if self.clock and isfinite(left) else {})
 
     def rounds(self) -> Iterator[dict[str, Any]]:
-        """Settings for one try after another, each of more iterations, as many as fit into the time
-        that is left: one for a backend with a clock, with few iterations, or without a time limit.
-        """
+        """Settings for one try after another, of more iterations, within the time that is left."""
         if not self.steps or not isfinite(time_left()):
             yield self.timed()
             return
-        most, count = self.settings[self.steps], FIRST
+        most, count = self.settings[self.steps], 10
         while True:
             check_time()
             begin = perf_counter()

@@ -66,9 +66,7 @@ class Child:
         start: np.ndarray | None,
         settings: dict[str, Any],
     ) -> tuple[Any, Any]:
-        """x and the multipliers y of qpsolvers.Problem(**arguments), None where there are none;
-        TimeUp at the deadline, BackendError if the backend fails or its process dies.
-        """
+        """x and y of qpsolvers.Problem(**arguments), or None; TimeUp or BackendError."""
         check_time()
         if self.process is None:
             self.process = _started()

@@ -35,9 +35,7 @@ class BoxQP:
         high: np.ndarray,
         start: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """x (n,) and the multipliers y (p,) of A x = b, which are checked, not believed.
-        BackendError if the backend crashes or its answer is not finite.
-        """
+        """x (n,) and the multipliers y (p,) of A x = b, both checked; BackendError on failure."""
         import qpsolvers
 
         form = sp.csc_matrix if self.backend.sparse else np.asarray

@@ -7,8 +7,6 @@ from contact to contact, as at a weighted median, and only the exact search find
 sticks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -19,13 +17,8 @@ from contactopt.problem.cones import disc_derivative
 from contactopt.problem.laws.law import Law
 
 LEAST_FELT = 1e-8  # share of a motion that closed, sticking or glued contacts must feel to hold it
-DIRECT = 5  # steps of Newton's method that are tried without softened friction
 SURE = 1e-6  # error of the balance, over all friction bounds, with which a motion counts as found
 STEPS = 50  # of Newton's method
-# by how much friction grows faster with the slip from one convex problem to the next
-SHARPER = 100.0
-SEARCH = 200  # evaluations of one line search
-EXACT = 1e-13  # relative error of the balance at which the search ends
 # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
 CURVATURE = 1e-10
 
@@ -56,7 +49,7 @@ def project_balanced(
         check_time()
         P, D = project(z)
         error = V.T @ P.ravel() + s
-        if np.all(np.abs(error) <= EXACT * size):
+        if np.all(np.abs(error) <= 1e-13 * size):  # of the balance
             break
         # lambda minimises a convex function with the gradient -(V'P + s) and the second derivative
         # V' rho D V.
@@ -79,7 +72,7 @@ def project_balanced(
 def _least(slope: Callable[[float], float], first: float) -> float:
     """The t > 0 where a slope that grows from `first` < 0 vanishes; 0 if not above rounding."""
     low, high, below, above, t = 0.0, np.inf, first, np.inf, 1.0
-    for trial in range(SEARCH):
+    for trial in range(200):  # evaluations of one line search
         value = slope(t)
         if abs(value) <= 0.1 * abs(first):
             return t
@@ -100,9 +93,7 @@ def _least(slope: Callable[[float], float], first: float) -> float:
 
 
 def loose_motions(V: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Orthonormal combinations (p, j) of the motions V that no closed contact holds along its
-    normal and no sticking one at all, by the derivative D (k, d, d) of the law's map.
-    """
+    """Orthonormal combinations (p, j) of V that closed and sticking contacts leave free."""
     d = D.shape[1]
     firm = np.repeat(np.all(np.eye(d) == D, axis=(1, 2))[:, None], d, axis=1)
     firm[:, 0] = np.any(D != 0, axis=(1, 2))
@@ -146,12 +137,12 @@ def settled(
         P, moved = project_balanced(_softened(bound, share), t, W, s, rho, moved, steps)
         return moved, bool(np.linalg.norm(W.T @ P.ravel() + s) <= SURE * bound.sum())
 
-    moved, found = balanced(np.zeros(len(s)), 1.0, DIRECT)
+    moved, found = balanced(np.zeros(len(s)), 1.0, 5)  # steps without softened friction
     if not found:  # far away the friction must soften first
         share = float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0))
         moved = np.zeros(len(s))
         while share < 1.0:
-            moved, share = balanced(moved, share)[0], SHARPER * share
+            moved, share = balanced(moved, share)[0], 100.0 * share  # times sharper friction
         moved, found = balanced(moved, 1.0)
     return loose @ moved if found else None
 

@@ -11,8 +11,6 @@ costs `dim` columns of G once, 2 n^2 operations each. The bonded solution, the c
 Newton's method, comes with it.
 """
 
-from __future__ import annotations
-
 import weakref
 
 import numpy as np
@@ -99,9 +97,7 @@ _last: list[tuple[weakref.ref[InterfaceProblem], Bonded]] = []
 
 
 def bonded(problem: InterfaceProblem) -> Bonded | None:
-    """The factors of a dimensionless problem, or None. They are kept for derivatives, until another
-    problem is factorised or the one that was made dimensionless is gone.
-    """
+    """The factors of a dimensionless problem, kept while it lives, or None."""
     try:
         made = Bonded(problem.Q, problem.V)
     except la.LinAlgError:

@@ -49,7 +49,7 @@ from contactopt.problem.certificate import Moved
 
 # V-cycles of all bodies for the bonded solution (`python -m experiments.questions.large_punch`)
 USUAL = 8
-IDLE = 3  # steps without progress after which it begins anew
+IDLE = 3  # steps without progress after which it starts again
 
 
 class State(NamedTuple):
@@ -125,10 +125,7 @@ class Coupled:
         return State(X, r.reshape(self.equations.q.shape), multipliers)
 
     def judged(self, at: State, error: np.ndarray) -> Known:
-        """The forces r + error, at the solution equal to r, with what Q makes of them. One V-cycle
-        improves the displacements; the accuracy stated is that before it, the energy (f'Bf)^1/2 of
-        the missing forces f over that of the displacements.
-        """
+        """The forces r + error, equal to r at the solution, what Q makes of them, its accuracy."""
         r = at.r + error
         return r, at.multipliers, improved(self.form, at.X, r)
 
@@ -156,7 +153,7 @@ class CoupledAt:
 
 class CoupledSteps:
     """Newton's method on contacts and bodies. Where the residual does not fall for IDLE steps, a
-    rough start has led the sorting of contacts into a circle: it begins anew, once, from an
+    rough start has led the sorting of contacts into a circle: it starts again, once, from an
     accurate bonded solution.
     """
 

@@ -7,8 +7,6 @@ Sci. Comput. 17, 538-559; Hwang, Su, Cai (2015), A parallel adaptive nonlinear e
 preconditioned inexact Newton method for transonic full potential equation.
 """
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np
@@ -20,9 +18,7 @@ from contactopt.problem import InterfaceProblem
 
 
 def eliminated(level: Level, at: Evaluation) -> Evaluation:
-    """Solve the contacts that make most of the residual by themselves, and return the errors with
-    these forces; the same ones where they are spread widely or do not fall.
-    """
+    """Solve alone the contacts that make most of the residual; returns errors and forces."""
     some = _worst(level, at)
     if not len(some) or len(level.components) < level.kernel.dim:
         return at

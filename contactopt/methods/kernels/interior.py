@@ -32,7 +32,6 @@ from contactopt.problem.cones import coulomb_cone, lengths
 
 NEAR = 1e-9  # complementarity and residual at which it ends
 TINY = 1e-20  # added to |u_t|^2, whose root has no derivative at zero
-BACKTRACKS = 30  # shortenings of a step, which leave a thousandth of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +141,7 @@ class System:
 def interior_iterates(
     problem: InterfaceProblem, matrix: Blocks, path: Path | None = None
 ) -> Iterator[tuple[Iterate, float]]:
-    """Iterates of the interior-point method on a dimensionless problem with Q `matrix`: a point in
-    the cones, and the largest of its mean complementarity, error of the law and of the balance [-].
-    """
+    """Points in the cones, and the largest of complementarity and errors of law and balance [-]."""
     path, cones = path or Path(), Lorentz(problem, matrix)
     # The first point lies on the axes of both cones, so that it is in their middle.
     x, z, lam = np.zeros(problem.q.shape), np.zeros(problem.q.shape), np.zeros(len(problem.s))
@@ -198,7 +195,7 @@ def _way(scaling: Scaling, dx: np.ndarray, dz: np.ndarray, boundary: float) -> f
     mean = float(np.vdot(x, z)) / k
     length = min(1.0, boundary * scaling.longest(dx, dz))
     least = np.minimum(constants.CENTRAL, constants.CENTRAL_KEPT * scaling.centrality / mean)
-    for _ in range(BACKTRACKS):
+    for _ in range(30):  # shortenings of a step, which leave a thousandth of it
         ahead = x + length * dx, z + length * dz
         centrality = np.sqrt(np.maximum(det(ahead[0]) * det(ahead[1]), 0.0))
         if np.all(centrality >= least * np.vdot(*ahead) / k):

@@ -16,8 +16,6 @@ by an inner iteration: if c1 G <= Q <= c2 G then the preconditioned system is th
 whatever sticks, slips or is open. Q is needed once per iteration.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 
@@ -42,8 +40,6 @@ from contactopt.methods.preconditioners import (
 from contactopt.problem import InterfaceProblem
 
 logger = logging.getLogger(__name__)
-
-FLAT = 1e-8  # eigenvalues of D below this are zero
 
 
 def model_of(
@@ -101,7 +97,7 @@ class Krylov:
         # The unknowns alpha are the amounts of the directions U in which a contact may still change
         # its force.
         U, delta, rho = _directions(at.D, equations.rho)
-        # B of the module's head; a proximal subproblem adds its weight to Q.
+        # B defined at the top; a proximal subproblem adds its weight to Q.
         added = (1 - delta) / (delta * rho) + equations.weight
         # dr0, the part of the step outside these directions, is known at once.
         known = error - U @ (U.T @ error)
@@ -149,7 +145,7 @@ def _directions(D: np.ndarray, rho: np.ndarray) -> tuple[sp.csr_matrix, np.ndarr
     # The eigenvectors of each contact's D become columns of U, which touch the rows of that contact
     # only.
     values, vectors = np.linalg.eigh(D)
-    contact, which = np.nonzero(values > FLAT)
+    contact, which = np.nonzero(values > 1e-8)  # eigenvalues of D below this are zero
     columns = vectors[contact, :, which]  # (m, d)
     rows = (contact[:, None] * d + np.arange(d)).ravel()
     m = len(contact)

@@ -8,8 +8,6 @@ preconditioned by the inverse of the symbol of Q on the grid without padding, re
 contacts that are closed and to the directions that are held.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 
@@ -27,7 +25,6 @@ from contactopt.methods.kernels.newton_loop import Forcing, Unknowns
 logger = logging.getLogger(__name__)
 
 ENOUGH = 0.5  # of what is enough that a step aims at, for linear systems are not solved in its norm
-ITERATIONS = 100  # of PCG
 
 Act = Callable[[np.ndarray], np.ndarray]
 
@@ -106,7 +103,7 @@ def _symmetric(
     z = border.off(near(residual))
     gamma = float(residual @ z)
     aim, p, count = rtol**2 * abs(gamma), z, 0
-    while count < ITERATIONS and gamma > aim:
+    while count < 100 and gamma > aim:  # of PCG
         product = act(p.reshape(c, m)).ravel().astype(float)
         work = float(p @ product)
         if not work > 0:  # forces that move nothing
@@ -210,9 +207,7 @@ def _rough_inverse(level: Level, at: Evaluation) -> Act:
 
 
 def _shift_shares(sigma: np.ndarray, largest: float) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Shifts from 0 to beyond `largest`, and the share (k, j) of each sigma (k, j) in each of them:
-    hat functions of log(FIRST_SHIFT + sigma), which sum to less than one beyond the last shift.
-    """
+    """Shifts up to `largest`, and the share (k, j) of each sigma in each: hats of its logarithm."""
     count = int(np.ceil(np.log(1 + largest / FIRST_SHIFT) / np.log(SHIFT_RATIO)))
     place = np.log1p(sigma / FIRST_SHIFT) / np.log(SHIFT_RATIO)
     shares = [np.maximum(0.0, 1 - np.abs(place - j)) for j in range(count + 1)]

@@ -146,11 +146,7 @@ class Level:
         return float(max(self.kernel.symbols[a, a].max() for a in self.components))
 
     def inverse_symbols(self, components: tuple[int, ...], shift: float = 0.0) -> Symbols:
-        """Symbols of an approximate inverse of Q + shift on the grid without padding, for (0,),
-        (1,) or (1, 2).
-
-        The symbol on the smaller grid is that of the kernel that repeats itself there.
-        """
+        """Symbols, on the bare grid, of an approximate inverse of Q + shift by components."""
         symbols = self.kernel.symbols
         every = (slice(None, None, 1 if self.periodic else 2),) * len(self.kernel.grid)
 

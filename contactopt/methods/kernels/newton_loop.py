@@ -8,8 +8,6 @@ Source of the accuracy of steps: Eisenstat, Walker (1996), Choosing the forcing 
 Newton method, SIAM J. Sci. Comput. 17, 16-32.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
@@ -49,10 +47,7 @@ class System(Protocol, Generic[At]):
 
 
 def newton_iterates(system: System[At], at: At, damped: bool = False) -> Iterator[At]:
-    """Newton's iterates from the evaluation `at`, until a linear system cannot be solved. With
-    `damped` a step is halved until its residual is below the worst of the last MEMORY ones, down to
-    SHORTEST.
-    """
+    """Newton's iterates from `at` while the linear systems can be solved; steps may be `damped`."""
     recent: list[float] = []
     while True:
         check_time()

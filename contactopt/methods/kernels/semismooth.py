@@ -6,8 +6,6 @@ is the square root of its accuracy off wherever force and gap vanish together. W
 map it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -32,7 +30,6 @@ Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 STEPS = 20  # of a crossover
 # added to Q in every Newton system: directions without compliance stay where they are
 RIDGE = 1e-10
-GOOD = 1e-14  # relative residual below which rounding is all that is left
 # relative residuals up to which an answer needs no second try, and above which it is none
 EXACT, WRONG = 1e-9, 1e-5
 
@@ -132,9 +129,7 @@ class Factored:
     def __call__(
         self, equations: Equations, at: Evaluated, rtol: float = 0.0, ridge: float = RIDGE
     ) -> Iterate | None:
-        """As `Solve`. Open contacts, D = 0, are known at once and leave the system. Where D = I, in
-        stick or in contact without friction, its rows are those of rho Q.
-        """
+        """As `Solve`; open contacts leave the system, and rows with D = I are those of rho Q."""
         (k, d), V, dr = at.error.shape, equations.V, at.error.ravel().copy()
         kept = np.repeat(at.D.reshape(k, d * d).any(axis=1), d)
         p = len(at.balance)
@@ -165,9 +160,7 @@ def crossover(
     multipliers: np.ndarray,
     steps: int = STEPS,
 ) -> Iterate:
-    """Improve an approximate answer r (k, d) of a dimensionless subproblem by Newton steps, and
-    return the best point on the way. c are the displacements without forces; rho is 1 in Equations.
-    """
+    """The best point of Newton steps from an answer r (k, d); c is u at r = 0, and rho is 1."""
     equations = Equations(Q, c.reshape(r.shape), V, s, project)
     residual, r, multipliers = _improve(equations, r, multipliers, steps)
     if steps == STEPS and residual > EXACT * max(1.0, float(np.linalg.norm(r))):
@@ -216,6 +209,6 @@ def _improve(
         if at.residual < best[0]:
             best = (at.residual, *at.point)
         size = max(1.0, float(np.linalg.norm(at.point[0])))
-        if at.residual <= GOOD * size or at.residual > 1e6 * best[0]:
+        if at.residual <= 1e-14 * size or at.residual > 1e6 * best[0]:  # rounding
             break
     return best

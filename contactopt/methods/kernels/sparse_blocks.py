@@ -5,8 +5,6 @@ the order of elimination and the places of its entries are found once; a system 
 array operations and one sparse LU factorisation (SuperLU).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -63,9 +61,7 @@ class Blocks:
     d: int
 
     def factor(self, left: np.ndarray | None, added: np.ndarray, kept: np.ndarray) -> Solver | None:
-        """Solver of the rows and columns `kept` (n,) of diag(left) Q + diag(added), whose blocks
-        are (k, d, d); None if singular. left None stands for the identity.
-        """
+        """Solver of rows and columns `kept` of diag(left) Q + diag(added); left None is I."""
         raise NotImplementedError
 
     def solve(
@@ -116,9 +112,7 @@ class DenseBlocks(Blocks):
 
 
 def blocks_of(Q: sp.csr_array, d: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Rows and columns (b,) of the d x d blocks of Q, row after row, the blocks (b, d, d), and
-    the place (k,) of each diagonal block, which is there even if it is zero.
-    """
+    """Rows, columns (b,), values (b, d, d) of the blocks of Q, and places (k,) of diagonal ones."""
     filled, own = sp.bsr_array(Q, blocksize=(d, d)), np.arange(Q.shape[0] // d)
     rows = np.repeat(own, np.diff(filled.indptr))
     keys = np.concatenate([rows * len(own) + filled.indices, own * len(own) + own])
@@ -205,9 +199,7 @@ def block_matrix(Q: Interface, d: int) -> Blocks:
 def bordered(
     solve: Solver, right: np.ndarray, V: np.ndarray, left: np.ndarray, balance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Solve A x + left lambda = right (m,) and V' x = balance (p,), given a solver with A; lambda
-    by least squares where not unique. None if a number is not finite.
-    """
+    """x, lambda of A x + left lambda = right, V' x = balance, given a solver with A; or None."""
     p = len(balance)
     x = solve(np.column_stack([right, left]) if p else right[:, None])
     if not np.all(np.isfinite(x)):

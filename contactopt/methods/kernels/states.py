@@ -34,10 +34,8 @@ from contactopt.linear.operators import has_entries
 from contactopt.problem import Infeasible, InterfaceProblem
 from contactopt.problem.feasibility import MARGIN
 
-PIVOT = 1e-8  # least pivot
 EXACT = 1e-10  # relative size of what rounding leaves of a zero in a contradiction
 BRANCH = 3e5  # entries that pivots change in the time that the rest of a branch takes
-FRESH = 50  # pivots after which a tableau is made anew from the data
 SAME = 1e-7  # relative size of what counts as zero when a point is given its states
 HALVED = 4  # how often an arc of 90 degrees is halved
 FREE, SHUT, DECIDED, SLIPPING = range(4)  # what a branch says of a contact in space
@@ -158,10 +156,7 @@ class StateTree:
         return self.unit[1 : self.n : 3], self.unit[2 : self.n : 3]
 
     def points(self) -> Iterator[Point | None]:
-        """Forces, multipliers and, in the plane, zero sides (3 k, 2) of each branch whose states
-        are all decided, and None after every other branch. In space it is a solution, or near to
-        one.
-        """
+        """Forces, multipliers and zero sides (3 k, 2) of solutions; None after other branches."""
         waiting = [self.root]
         while waiting:
             check_time()
@@ -212,9 +207,7 @@ class StateTree:
         return [first, second] if w[pair] > z[pair] else [second, first]
 
     def _space(self, branch: _Branch, r: np.ndarray, u: np.ndarray) -> list[_Branch]:
-        """The branches of the contact that is furthest from the law; none at a solution, or where
-        all arcs are small.
-        """
+        """The branches of the contact furthest from the law; none at a solution."""
         mu, state = self.problem.mu, branch.state
         speed = np.linalg.norm(u[:, 1:], axis=1)
         along = u[:, 1:] / np.maximum(speed, 1e-300)[:, None]
@@ -254,10 +247,8 @@ class StateTree:
         return other
 
     def feasible(self, branch: _Branch) -> bool:
-        """Whether the branch has a point, to which its tableau is brought; True also where rounding
-        leaves that open.
-        """
-        doubtful, fresh = np.zeros(len(branch.b), dtype=bool), branch.pivots > FRESH
+        """Whether the branch may have a point, to which its tableau is brought."""
+        doubtful, fresh = np.zeros(len(branch.b), dtype=bool), branch.pivots > 50
         doubtful[self.n : self.n + len(self.problem.s)] = True  # multipliers have either sign
         if fresh:
             branch.remake()
@@ -276,7 +267,7 @@ class StateTree:
             row = branch.T[i, :-1] * (1.0 if right[i] > 0 else -1.0)
             either = (branch.other >= self.n) & (branch.other < self.n + len(self.problem.s))
             row = np.where(either, np.abs(row), row)
-            usable = np.flatnonzero((row > PIVOT) & ~branch.zero[branch.other])
+            usable = np.flatnonzero((row > 1e-8) & ~branch.zero[branch.other])  # least pivot
             if len(usable):
                 least = np.argmin(branch.other[usable]) if careful else np.argmax(row[usable])
                 branch.pivot(i, int(usable[least]))

@@ -3,8 +3,6 @@
 the other as it is given. Each step is one PCG of contactopt.methods.kernels.krylov.
 """
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np
@@ -20,9 +18,7 @@ from contactopt.methods.preconditioners import Preconditioner
 from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc_derivative, half_line_derivative
 
-LOOPS = 60  # proximal steps
 EXACT = 1e-10  # residual relative to the size of the forces at which a subproblem is solved
-USABLE = 1e-5  # and above which there is no answer
 
 
 class KrylovSubproblem:
@@ -37,16 +33,14 @@ class KrylovSubproblem:
         self.compliance = compliance[:, 0] if normal else compliance[:, 1:].mean(axis=1)
 
     def solve(self, r: np.ndarray, multipliers: np.ndarray) -> Iterate:
-        """r (k, dim) with its own components new, and the multipliers, by active sets; where these
-        cycle, by the proximal loop. BackendError if that does not come near a solution either.
-        """
+        """r with its own components new, and multipliers; BackendError far from a solution."""
         equations = self._equations(r, multipliers, 0.0, 0.0)
         point = r, multipliers[self.columns]
         if not r[:, self.own].any():
             point = self._glued(*point, equations)
         residual, point = self._active_sets(equations, *point)
         size, weight = max(1.0, float(np.linalg.norm(point[0]))), 1.0
-        for _ in range(LOOPS):
+        for _ in range(60):  # proximal steps
             if residual <= EXACT * size:
                 return point
             left, new = self._active_sets(self._equations(r, multipliers, point[0], weight), *point)
@@ -55,7 +49,7 @@ class KrylovSubproblem:
                 residual = equations.evaluate(*point)[0]
             else:
                 weight *= constants.WEIGHT_RISE
-        if residual > USABLE * size:
+        if residual > 1e-5 * size:  # then there is no answer
             kind = "normal" if self.normal else "tangential"
             raise BackendError(f"backend 'pcg' misses the {kind} problem by {residual / size:.1e}")
         return point

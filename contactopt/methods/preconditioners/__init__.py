@@ -26,8 +26,6 @@ holds on every subspace with the same constants, so that (G_AA)^-1, by an inner 
 body, has the condition number of P on any active set (`restricted`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -46,7 +44,6 @@ from contactopt.problem import InterfaceProblem, part_of
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
 # share of a smooth motion's energy, apart from that of others, below which it is one of them
 DEPENDENT = 1e-10
-LEFT = 1e-6  # share of a random force's work below which deflation leaves nothing to scale by
 
 
 class Preconditioner(LinearOperator):
@@ -114,9 +111,7 @@ def find_preconditioner(name: str | None) -> None:
 
 
 def preconditioner(problem: InterfaceProblem, name: str) -> Preconditioner:
-    """The named approximate inverse of problem.Q in a block for each pair of surfaces, by its mean
-    diagonal; InputError for an unknown name, and for contacts that do not fit.
-    """
+    """The named approximate inverse of Q, in a block for each pair; InputError if none fits."""
     find_preconditioner(name)
     if len(problem.pairs) > 1:
         return _blocks(
@@ -164,9 +159,7 @@ def smooth_motions(problem: InterfaceProblem) -> np.ndarray:
 
 
 def degrees(problem: InterfaceProblem) -> list[int]:
-    """The degree of the smooth motions of each pair: the distance between two pairs is the median
-    over the contacts of one, so that pairs that meet at a corner are not taken for neighbours.
-    """
+    """The degree of each pair's smooth motions; distances are medians, since pairs may meet."""
     from scipy.spatial import KDTree  # late, since it takes long to import
 
     points = [problem.coordinates[:, pair.contacts].T for pair in problem.pairs]
@@ -181,9 +174,7 @@ def degrees(problem: InterfaceProblem) -> list[int]:
 
 
 def _smooth_motions(problem: InterfaceProblem, degree: int) -> np.ndarray:
-    """(k dim, j): Chebyshev polynomials of the place, or cosines and sines on a closed line, in
-    every component; zero where it cannot move, and without what is then no motion of its own.
-    """
+    """(k dim, j): Chebyshev polynomials, or cosines and sines on a closed line, by component."""
     chart = problem.chart
     if chart.period is not None:
         angle = 2 * np.pi * np.outer(np.arange(degree + 1), chart.places[0]) / chart.period
@@ -237,9 +228,7 @@ def deflated(P: Preconditioner, Q: Interface, Z: np.ndarray) -> Preconditioner:
 
 
 def _orthonormal(Z: np.ndarray, QZ: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, j) with Z'QZ = I on the same columns, and QZ, without columns that depend on others or
-    move nothing, as constant ones on a periodic half-space.
-    """
+    """Z (n, j) on the same columns with Z'QZ = I, and QZ, without columns that move nothing."""
     energy = np.einsum("ij,ij->j", Z, QZ)
     each = energy / np.maximum(np.einsum("ij,ij->j", Z, Z), 1e-300)
     acts = each > DEPENDENT * each.max(initial=0.0)
@@ -272,7 +261,7 @@ def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
     rest = whole - np.sum((QZ.T @ X) ** 2, axis=0)
     c = np.ones(len(QZ))
     for i, own in enumerate(P.blocks):
-        work = rest[i] if rest[i] > LEFT * whole[i] else whole[i]
+        work = rest[i] if rest[i] > 1e-6 * whole[i] else whole[i]  # enough to scale by
         c[own] = float(random[own] @ made[own]) / work if work > 0 else 1.0
     return c
 

@@ -1,7 +1,5 @@
 """The paper's circulant preconditioners P21, P22 and P31 (section 5.2)."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import fft, ifft, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg
@@ -14,9 +12,7 @@ INNER = 1e-13
 
 
 def seminorm(m: float) -> np.ndarray:
-    """The first column (2 m,) of the circulant matrix of the H^1/2 seminorm, eq (27), on a closed
-    curve of 2 m nodes: about 2 log2 m entries, of sum zero where m is a power of two.
-    """
+    """The first column (2 m,) of the H^1/2 seminorm's matrix, eq (27), on a closed curve."""
     column, top = np.zeros(round(2 * m)), int(np.ceil(np.log2(m)))
     column[0] = 2 * np.sum(1 / np.arange(1, 2**top) ** 2.0)
     for i in range(1, top + 1):
@@ -46,10 +42,7 @@ def extended(grid: Grid) -> tuple[GridMap, None]:
 
 
 def inverse_of_extended(grid: Grid) -> tuple[GridMap, GridMap]:
-    """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), a Toeplitz system solved by conjugate gradients, and
-    its inverse. The spacing h of eq (28) is in quarters of the contact line. InputError on a
-    surface.
-    """
+    """P22 = (E' L_c^-1 Q_c E)^-1 of eq (26), and its inverse; InputError on a surface."""
     if len(grid.shape) > 1:
         raise InputError(
             "preconditioner 'p22' is for contact lines (2D); in 3D choose p21 or neumann."
@@ -76,9 +69,7 @@ p22 = OnGrid(inverse_of_extended)
 
 
 def _closed_symbol(k: int) -> tuple[np.ndarray, float]:
-    """Eigenvalues (k,) of the seminorm on a closed curve of k nodes, and the least positive one.
-    The sum of the column of eq (27), not zero where k is no power of two, is subtracted from all.
-    """
+    """Eigenvalues (k,), of sum zero, of the seminorm on a closed curve, and the least positive."""
     symbol = fft(seminorm(k / 2)).real
     symbol = symbol - symbol[0]
     return symbol, float(symbol[1:].min())

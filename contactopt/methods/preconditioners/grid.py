@@ -1,7 +1,5 @@
 """The grid of the contacts: a line, a closed curve or a rectangle that transforms work on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -48,9 +46,7 @@ class Grid:
 
 
 def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray]:
-    """The line, closed curve or rectangular grid, turned by any angle in the chart, on which the
-    contacts lie, and the contacts (k,) in its order.
-    """
+    """The line, closed curve or rectangular grid of the contacts, and these (k,) in its order."""
     if problem.dim == 2:
         return _line(problem, held)
     turn = _turn(problem.chart.places)
@@ -96,9 +92,7 @@ class OnGrid:
         object.__setattr__(self, "__doc__", self.make.__doc__)
 
     def __call__(self, problem: InterfaceProblem, held: np.ndarray) -> GridMaps:
-        """Products with P and P^-1, or None, on arrays (k, dim); InputError without a grid of 3 a
-        side.
-        """
+        """Products with P and P^-1, or None, on (k, dim); InputError without a grid."""
         grid, order = _grid_of(problem, held)
 
         def placed(act: GridMap) -> GridMap:
@@ -131,9 +125,7 @@ def _line(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndarray
 
 
 def _turn(places: np.ndarray) -> np.ndarray:
-    """Rotation (2, 2) that lays the directions to nearest neighbours of places (2, k) along the
-    axes, by the smallest angle, and exactly 1 where they lie there.
-    """
+    """Rotation (2, 2) that lays neighbours of places (2, k) along the axes by the least angle."""
     points = places.T
     if len(points) < 4:
         return np.eye(2)

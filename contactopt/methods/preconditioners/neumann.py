@@ -8,8 +8,6 @@ numbers up to smooth terms. On a surface the kernel is 1 / |x_i - x_j|, and a di
 spacing has eigenvectors of its own: a matrix as small as one side of the grid.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -84,9 +82,7 @@ def _direction(ticks: np.ndarray, held: np.ndarray, line: bool) -> Direction:
 
 
 def _root_on_grid(grid: Grid) -> tuple[GridMap, GridMap]:
-    """Square root of the weighted Laplacian of the contacts, and its inverse; half the least other
-    eigenvalue of the root stands in the place of zero, for constants.
-    """
+    """Square root of the weighted Laplacian, and its inverse; constants have half its least."""
     parts = [_root(grid, component) for component in range(len(grid.held))]
     weight = grid.weights.reshape(grid.shape)
 

@@ -24,8 +24,6 @@ contour integrals, method 3 for the square root. Johnson (1985), Contact mechani
 the compliance of the half-space.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -47,16 +45,12 @@ from contactopt.methods.preconditioners.constants import (
 )
 from contactopt.problem import InterfaceProblem
 
-ACCURACY = 1e-3  # of the rational function
-
 Act = Callable[[np.ndarray], np.ndarray]
 Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 
 def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
-    """Products (k, dim) -> (k, dim) with P and with its inverse G, scaled to a mean diagonal of
-    one, an estimate by random signs (Hutchinson 1989). InputError without cells.
-    """
+    """Products with P and P^-1, mean diagonal one (Hutchinson 1989); InputError without cells."""
     cells = problem.chart.cells
     if cells is None:
         raise InputError(
@@ -215,9 +209,7 @@ def _by_poles(L: sp.csc_matrix, low: float) -> Callable[[np.ndarray], np.ndarray
     return lambda x: np.asarray(sum(c * factors.solve(x) for c, factors in poles))
 
 
-def inverse_root(
-    low: float, high: float, accuracy: float = ACCURACY
-) -> tuple[np.ndarray, np.ndarray]:
+def inverse_root(low: float, high: float, accuracy: float = 1e-3) -> tuple[np.ndarray, np.ndarray]:
     """c (j,) and s (j,) > 0: sum of c / (x + s) is x^-1/2 to this accuracy between the bounds."""
     m = low / high
     inner, outer = float(ellipk(m)), float(ellipkm1(m))  # K(m) and K(1 - m)

@@ -1,7 +1,5 @@
 """Coulomb friction at contacts that may open, eqs (15) to (17) of the paper."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,9 +40,7 @@ class Coulomb(Law):
         return coulomb_cone_derivative(y, self.mu)
 
     def project(self, y: np.ndarray) -> Projected:
-        """max(y_n, 0), and y_t projected on the disc of radius mu max(y_n, 0) (Alart, Curnier). It
-        is no projection on a convex set, but r = P(r - rho u) exactly at the solutions.
-        """
+        """max(y_n, 0), and y_t projected on the disc of radius mu max(y_n, 0) (Alart, Curnier)."""
         n, t = split(y)
         closed = n > 0
         P, D = disc_of_height(np.maximum(n, 0.0), t, self.mu, closed.astype(float))

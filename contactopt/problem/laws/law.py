@@ -138,9 +138,7 @@ class Law:
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
-        """The map P(y) (k, dim) of Newton's equations r = P(r - rho u), and its generalised
-        derivatives (k, dim, dim).
-        """
+        """P(y) (k, dim) of r = P(r - rho u), and generalised derivatives (k, dim, dim)."""
         return self.nearest_derivative(y, y[:, 0])
 
     def mapped(self, y: np.ndarray) -> np.ndarray:
@@ -148,9 +146,7 @@ class Law:
         return self.project(y)[0]
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
-        """Derivatives (k, dim) of `project` by the law's parameter at each contact. InputError for
-        a law that does not know them.
-        """
+        """Derivatives (k, dim) of `project` by the parameter; InputError if unknown."""
         raise InputError(
             f"the law {type(self).__name__} has no derivative with respect to its parameter"
             " (project_by_parameter)."
@@ -214,9 +210,7 @@ class Law:
         return self.select(first)
 
     def spread(self, k: int) -> Self:
-        """The law of k contacts, whose numbers become arrays (k,). InputError if one is an array of
-        another length.
-        """
+        """The law of k contacts, all numbers (k,); InputError for an array of another length."""
         shapes = {name: np.shape(getattr(self, name)) for name in self.parameters}
         for name, shape in shapes.items():
             if shape not in ((), (k,)):
@@ -227,8 +221,8 @@ class Law:
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Law:
-        """The law of the k contacts of a scene, from the values that it gives: friction
-        coefficients, unless the law says otherwise, one or (k,). InputError on another shape.
+        """The law of the k contacts of a scene. `values` are the scene's friction coefficients, or
+        what the law reads in their place: one number, or (k,). InputError on another shape.
         """
         if values.shape not in ((), place.areas.shape):
             raise InputError(

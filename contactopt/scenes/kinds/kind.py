@@ -31,9 +31,7 @@ class Kind:
         return len(self.components)
 
     def measure(self, thickness: float) -> float:
-        """What integrals over the mesh are multiplied with, and if revolved also with r: the
-        thickness of the scene, 2 pi or 1.
-        """
+        """The factor of integrals over the mesh, without r: thickness, 2 pi or 1."""
         return thickness
 
     def constants(self, material: Material) -> tuple[float, float]:
@@ -45,9 +43,7 @@ class Kind:
         return lame_by_poisson(material)
 
     def half_width(self, area: float, thickness: float) -> float:
-        """The half-width or radius [length] of a contact zone of this area and a simple shape: a
-        strip of the thickness, a disc or a square.
-        """
+        """The half-width [length] of a zone of this area: a strip, a disc or a square."""
         return area / (2 * thickness)
 
     def area(self, half_width: float, thickness: float) -> float:

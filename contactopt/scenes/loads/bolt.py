@@ -57,9 +57,7 @@ class Bolt:
             check_name("the bolt's name", self.name)
 
     def ends(self, parts: Sequence[Any], name: str) -> list[tuple[str, BoltEnd]]:
-        """Its two loads, each with the name of its body; `name` is that of the bolt without one.
-        InputError unless both bodies are there and have meshes.
-        """
+        """Its two loads, each with its body's name. InputError unless both have meshes."""
         made = []
         for face in self.between:
             found = [p for p in parts if face.startswith((f"{p.name}.", f"{p.name}:"))]
@@ -170,9 +168,7 @@ def with_bolts(parts: Sequence[Any], bolts: Sequence[Bolt]) -> tuple[Any, ...]:
 
 
 def stiff_faces(ends: Mapping[str, Sequence[tuple[Part, BoltEnd]]], body: str) -> dict[str, str]:
-    """The bolts that keep faces of a body parallel, in words, by the plates that they are there;
-    from the ends of all bolts by their names.
-    """
+    """In words the bolts that keep faces of a body parallel, by the plates there."""
     found: dict[str, str] = {}
     for name, both in ends.items():
         for part, end in both:

@@ -59,7 +59,7 @@ def frontier(rows: list[Row], word: str) -> Any:
 
 
 def shares(tried: dict[str, int], failed: dict[str, int]) -> Any:
-    """Of how many problems of each kind a method failed on which share."""
+    """How many problems of each kind there are, and on which share of them a method failed."""
     figure, (ax,) = paper_axes()
     kinds = [kind for kind in KINDS if tried.get(kind)]
     share = np.array([100 * failed.get(kind, 0) / tried[kind] for kind in kinds])

@@ -54,7 +54,7 @@ RESOLVED = 0.01  # relative accuracy of an observed threshold
 
 
 class Linearised:
-    """The matrices of the module's head at forces r (k, dim) and displacements u (k, dim)."""
+    """The matrices defined at the top at forces r (k, dim) and displacements u (k, dim)."""
 
     def __init__(self, problem: InterfaceProblem, r: np.ndarray, u: np.ndarray):
         dim, mu, size = r.shape[1], problem.mu, np.linalg.norm(r[:, 1:], axis=1)
@@ -198,7 +198,7 @@ def pair(ratio: float, b: float, mu: float = 0.5) -> Case:
 
 def newton_load(b: float, mu: float) -> Case:
     """The load of one contact on which Newton's method cycles if any does, in the middle of the
-    window of the module's head."""
+    window defined at the top."""
     slip = np.sqrt((1 - b**2) * max(mu**2 - 1, 0.01))
     return one_contact(b, mu, -np.sign(b), slip)
 

@@ -83,7 +83,7 @@ def _powers(flat: int, degree: int) -> list[tuple[int, ...]]:
 
 
 def _integral(power: tuple[int, ...], low: np.ndarray, high: np.ndarray, revolved: bool) -> float:
-    """Of a product of powers of coordinates from 0 to 1, with the radius as a factor."""
+    """The integral of a product of powers of coordinates from 0 to 1, times the radius or not."""
     plain = float(np.prod([1 / (i + 1) for i in power]))
     if not revolved:
         return plain
