@@ -70,7 +70,7 @@ class Proposal:
 
 
 @dataclass(frozen=True)
-class Contact:
+class ContactFacts:
     """What the rule knows of a contact.
 
     edge      'free', 'corner' or 'none', as above
@@ -109,7 +109,7 @@ class Contact:
 
 
 def propose(
-    quantity: str, accuracy: float, contact: Contact, degrees: tuple[int, ...] = (0, 1, 2)
+    quantity: str, accuracy: float, contact: ContactFacts, degrees: tuple[int, ...] = (0, 1, 2)
 ) -> Proposal | None:
     """The cheapest mesh for a relative accuracy, of the degrees that are open; None where the
     quantity has no rule.
@@ -150,7 +150,7 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
     flat = all(part.curve is None for part in scene.parts if isinstance(part, Part))
     meshes = (1, 2) if scene.dim == 2 else ()
     power = power_of(own.positions, own.gap, width) if edge == "free" else 2.0
-    contact = Contact(edge, size, power, scene.dim == 3, _rubs(scene))
+    contact = ContactFacts(edge, size, power, scene.dim == 3, _rubs(scene))
     found = propose(quantity, accuracy, contact, (0, *meshes) if flat else meshes)
     if found is None:
         return []

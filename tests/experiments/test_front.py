@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from contactopt import Material, scenes, solve
-from contactopt.accuracy.proposal import Contact, power_of, propose
+from contactopt.accuracy.proposal import ContactFacts, power_of, propose
 from contactopt.figures.scene_check import check_scene
 from experiments.questions import penalty
 from experiments.questions.front.bodies import ellipse, half_space, point
@@ -49,14 +49,14 @@ def test_an_ellipse_that_is_round_is_hertz():
 @pytest.mark.parametrize(
     ("asked", "degree", "elements"),
     [
-        (("pressure", 0.01, Contact("free")), 0, 20),
-        (("pressure", 0.01, Contact("free", solid=True)), 0, 11),  # points cost n^2 there
-        (("stick", 0.03, Contact("free", solid=True, friction=True)), 0, 7),
-        (("pressure", 0.003, Contact("free", power=4.0, solid=True)), 0, 22),
-        (("pressure", 0.01, Contact("free", 5.0)), 1, 8),  # the body is no half-space
-        (("approach", 0.001, Contact("free", 1e4), (1, 2)), 2, 22),
-        (("stick", 0.003, Contact("corner"), (1, 2)), 1, 58),
-        (("approach", 0.01, Contact("corner", solid=True)), 0, 18),
+        (("pressure", 0.01, ContactFacts("free")), 0, 20),
+        (("pressure", 0.01, ContactFacts("free", solid=True)), 0, 11),  # points cost n^2 there
+        (("stick", 0.03, ContactFacts("free", solid=True, friction=True)), 0, 7),
+        (("pressure", 0.003, ContactFacts("free", power=4.0, solid=True)), 0, 22),
+        (("pressure", 0.01, ContactFacts("free", 5.0)), 1, 8),  # the body is no half-space
+        (("approach", 0.001, ContactFacts("free", 1e4), (1, 2)), 2, 22),
+        (("stick", 0.003, ContactFacts("corner"), (1, 2)), 1, 58),
+        (("approach", 0.01, ContactFacts("corner", solid=True)), 0, 18),
     ],
 )
 def test_the_rule_takes_the_cheapest_mesh_for_an_accuracy(asked, degree, elements):
@@ -68,11 +68,11 @@ def test_the_rule_takes_the_cheapest_mesh_for_an_accuracy(asked, degree, element
 @pytest.mark.parametrize(
     ("quantity", "contact"),
     [
-        ("energy", Contact("free")),
-        ("pressure", Contact("corner")),  # which is infinite
-        ("pressure", Contact("free", power=1.5)),  # which has a cusp
-        ("pressure", Contact("free", power=np.nan)),  # of a rough surface
-        ("width", Contact("free", power=4.0)),  # whose edge is too steep for a fit
+        ("energy", ContactFacts("free")),
+        ("pressure", ContactFacts("corner")),  # which is infinite
+        ("pressure", ContactFacts("free", power=1.5)),  # which has a cusp
+        ("pressure", ContactFacts("free", power=np.nan)),  # of a rough surface
+        ("width", ContactFacts("free", power=4.0)),  # whose edge is too steep for a fit
     ],
 )
 def test_there_is_no_rule_for_what_was_not_measured(quantity, contact):
@@ -85,7 +85,7 @@ def test_the_exponent_of_a_gap_is_found(m):
     gap = (x[0] ** 2 + 6 * x[1] ** 2) ** (m / 2)  # on an ellipse of ratio .4
     assert power_of(x, gap, 1.0) == pytest.approx(m, abs=0.1)
     rough = np.random.default_rng(0).uniform(0, 1, gap.shape)
-    assert propose("pressure", 0.01, Contact("free", power=power_of(x, rough, 1.0))) is None
+    assert propose("pressure", 0.01, ContactFacts("free", power=power_of(x, rough, 1.0))) is None
 
 
 def test_the_rule_meets_its_accuracy_on_scenes_that_it_has_not_seen():

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
 from contactopt import HalfSpace, Material, Rigid, Scene, scenes
-from contactopt.accuracy.proposal import Contact, propose
+from contactopt.accuracy.proposal import ContactFacts, propose
 from contactopt.analytic import (
     Reference,
     contact_modulus,
@@ -57,7 +57,7 @@ class Unseen:
     quantity: str
     accuracy: float
     exact: float
-    contact: Contact
+    contact: ContactFacts
     ways: dict[Any, Make]
 
 
@@ -97,7 +97,7 @@ def pressed(name: str, quantity: str, known: Known, accuracy: float, m: float = 
     else:
         ways |= {"solid": partial(solid_model, known)}
     exact = (truth | {"approach": known.exact.approach})[quantity]
-    contact = Contact("free", power=m, solid=not known.plane)
+    contact = ContactFacts("free", power=m, solid=not known.plane)
     return Unseen(name, quantity, accuracy, float(exact or 0), contact, ways)
 
 
@@ -119,7 +119,7 @@ def punch(kind: str, quantity: str, mu: float, nu: float, accuracy: float) -> Un
     value = exact.approach if quantity == "approach" else exact.stick_half_width
     name = f"{'strip' if plane else 'disc'}, mu = {mu:.2g}, nu = {nu:.2g}"
     ways = both(scene) if plane else both(scene) | {0: lambda: disc_of_points(mu, material)}
-    contact = Contact("corner", solid=not plane, friction=mu > 0)
+    contact = ContactFacts("corner", solid=not plane, friction=mu > 0)
     return Unseen(name, quantity, accuracy, float(value or 0), contact, ways)
 
 
@@ -144,7 +144,7 @@ def fitted(kind: str, sizes: tuple[float, float, float], hub: Material, accuracy
     )
     name = f"press fit, {bore:.2g} / {radius:.2g} / {outside:.2g}, {kind}"
     peak = scene.reference.peak
-    return Unseen(name, "pressure", accuracy, peak, Contact("none"), both(scene))
+    return Unseen(name, "pressure", accuracy, peak, ContactFacts("none"), both(scene))
 
 
 def layer(quantity: str, held: bool, height: float, accuracy: float) -> Unseen:
@@ -157,7 +157,7 @@ def layer(quantity: str, held: bool, height: float, accuracy: float) -> Unseen:
     ways = both(scene) | {0: partial(half_space, line(0.05, ROUND, UNIT))}
     value = {"pressure": found.peak, "width": a}[quantity]
     name = f"layer of {height:.2g}{', bonded' if held else ''}"
-    return Unseen(name, quantity, accuracy, value, Contact("free", height / a), ways)
+    return Unseen(name, quantity, accuracy, value, ContactFacts("free", height / a), ways)
 
 
 def sheared(solid: bool, mu: float, share: float, accuracy: float) -> Unseen:
@@ -171,7 +171,7 @@ def sheared(solid: bool, mu: float, share: float, accuracy: float) -> Unseen:
         made = scenes.cattaneo(2, mu=mu, shear=share * mu * 100.0)
         ways = both(made)
     exact = made.reference.stick_half_width / made.reference.half_width
-    contact = Contact("free", np.inf if solid else 50.0, solid=solid, friction=True)
+    contact = ContactFacts("free", np.inf if solid else 50.0, solid=solid, friction=True)
     name = f"{'balls' if solid else 'rollers'}, {share:.2g} of sliding at mu = {mu:.2g}"
     return Unseen(name, "stick", accuracy, exact, contact, ways)
 
