@@ -82,10 +82,7 @@ def misfit(found: Sequence[ElementErrors]) -> float:
 
 
 def element_errors(
-    solved: Solved,
-    quantity: Quantity | None,
-    value: float,
-    volumes: Sequence[np.ndarray] = (),
+    solved: Solved, quantity: Quantity | None, value: float, volumes: Sequence[np.ndarray] = ()
 ) -> ElementErrors:
     """What each element adds to the error of a quantity with this value, as in contactopt.accuracy.
 
@@ -198,9 +195,7 @@ def _state(solved: Solved, number: int) -> Solved:
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What elements (elements,) at the contact add to the error of a function of the forces with
-    the derivatives `weights` (k,), because the pressure varies between contacts.
-    """
+    """What elements at the contact add to the error because pressure varies between contacts."""
     reduction, problem = solved.reduction, solved.reduction.problem
     added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
     shares = spread(reduction, np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))))

@@ -71,9 +71,7 @@ def refine(
 
 
 def _in_time(options: Options, accuracy: float) -> Options:
-    """Options with which solvers stop at a tenth of the accuracy, small enough for derivatives,
-    unless another tolerance is asked for.
-    """
+    """Options with which solvers stop at a tenth of the accuracy, unless a tolerance is given."""
     if options.tol != TOL:
         return options
     return replace(options, tol=max(TOL, min(CERTIFIED, 0.1 * accuracy)))  # a tenth is the solver's

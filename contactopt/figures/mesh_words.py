@@ -66,9 +66,7 @@ def _measure(mesh: Mesh, facets: np.ndarray | None = None) -> tuple[float, np.nd
 
 
 def _shape(mesh: Mesh, facets: np.ndarray) -> str:
-    """The outward normal of a flat boundary; the radius of a circle, a cylinder or a sphere, whose
-    points are x = c + R n with the normal n across its axis.
-    """
+    """The normal of a flat boundary, or the radius of a circle, cylinder or sphere."""
     from skfem.quadrature import get_quadrature
 
     at = Faces(mesh, facets, get_quadrature(mesh.brefdom, DEGREE)[0])

@@ -1,6 +1,4 @@
-"""Whether the mesh resolves the contact at all: remarks for people, on answers whose certificate
-says nothing of the mesh.
-"""
+"""Whether the mesh resolves the contact, of which the certificate says nothing: remarks."""
 
 import numpy as np
 
@@ -64,9 +62,7 @@ def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
 
 
 def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
-    """The pairs of surfaces whose zone of contact is smaller than the mesh can show: name and
-    number of contacts of each, with the numbers of those that touch.
-    """
+    """Name, number of contacts and touching ones of pairs whose zone the mesh cannot show."""
     found = []
     for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):
         problem = view.problem

@@ -37,9 +37,7 @@ UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facet
 
 
 def overlap_share(reduction: Reduction, solution: Solution) -> float:
-    """By which share the areas of surfaces that overlap as drawn differ, the mean weighted by
-    forces [-]: small displacements do not tell on which of the two a pressure acts.
-    """
+    """By which share the areas of surfaces that overlap as drawn differ, weighted by forces."""
     shares = np.zeros(len(solution.reactions))
     ring = reduction.scene.kind == "axisymmetric"
     for pair, made in zip(reduction.problem.pairs, reduction.couplings):

@@ -2,8 +2,6 @@
 fro.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -1,6 +1,4 @@
-"""Follow a load path: one state after the other, on the bodies, coupling and Q of the first
-(contactopt.solving.paths).
-"""
+"""Follow a load path: one state after the other, on bodies, coupling and Q of the first."""
 
 from collections.abc import Callable, Iterable, Sized
 from dataclasses import replace

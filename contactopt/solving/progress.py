@@ -1,6 +1,4 @@
-"""One line per outer iteration of a solve that takes long: what it has reached, what it took, what
-is left.
-"""
+"""One line per outer iteration of a long solve: what it reached, what it took, what is left."""
 
 import math
 import resource

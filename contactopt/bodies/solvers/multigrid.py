@@ -292,9 +292,7 @@ def _starts(A: sp.bsr_matrix, chosen: np.ndarray) -> np.ndarray:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """The translations and rotations of points (dim, k) as columns, (k dim, 3) in 2D and (k dim, 6)
-    in 3D, the near-kernel of the stiffness, hoop strain apart.
-    """
+    """The translations and rotations of points (dim, k) as columns, (k dim, 3 or 6)."""
     fields = rigid_fields(points)
     return fields.swapaxes(0, 1).reshape(-1, fields.shape[2])
 
