@@ -282,7 +282,7 @@ def test_a_scene_without_a_plate_has_no_approach():
     driven = replace(
         base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1}))
     )
-    with pytest.raises(InputError, match="no plate, hence no approach"):
+    with pytest.raises(InputError, match="has no approach, since it has no plate"):
         run(replace(base, upper=driven), accuracy=0.1, quantity="approach")
 
 
