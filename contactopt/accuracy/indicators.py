@@ -174,10 +174,7 @@ def read_once(solved: Solved, name: str) -> dict[str, Any]:
 def along_path(
     solved: Solved, quantity: Quantity, value: float, volumes: Sequence[np.ndarray] = ()
 ) -> ElementErrors:
-    """As element_errors, for a load path as well. Friction remembers the slip of earlier states,
-    and no adjoint goes back over them: elements are marked by the largest energy of the error of
-    all states.
-    """
+    """As element_errors; for a load path by the largest energy of the error of all states."""
     if solved.path is None:
         return element_errors(solved, quantity, value, volumes)
     count = len(solved.path.states)

@@ -130,10 +130,7 @@ def taken(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def comparable(points: pd.DataFrame) -> pd.DataFrame:
-    """The points of the entrants, which take some problem, on the problems that all of them take.
-
-    A method without a row on a problem was not run there, which counts as a failure.
-    """
+    """The points of the entrants on the problems that all take; a missing row is a failure."""
     takes = taken(points)
     takes = takes.loc[:, takes.any()]
     common = takes.index[takes.all(axis=1)]

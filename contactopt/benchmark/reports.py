@@ -97,10 +97,7 @@ def write_report(
     formats: Sequence[str] = (),
     said: Sequence[str] = (),
 ) -> str:
-    """Write report.md into a folder, and its pictures as PNG and in more formats; its Markdown.
-
-    said  sentences about the rows, which stand at its end
-    """
+    """Write report.md with `said` at its end, and its pictures, to a folder; its Markdown."""
     parts = [f"# {_one_line(layout.title)}", layout.text.strip()]
     if layout.findings:
         found = enumerate(_findings(layout, table), 1)

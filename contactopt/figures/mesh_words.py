@@ -19,9 +19,7 @@ SHAPE = 0.02  # by how much a boundary may be off a plane or a circle [of 1, of 
 
 
 def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[str, Any]]:
-    """The beginning of a scene file in TOML, with the sizes of bodies and boundaries in comments;
-    and the meshes by the names that it gives to the bodies. `meshes` are by the names of groups.
-    """
+    """The beginning of a scene file in TOML with sizes in comments, and the meshes by its names."""
     named = {re.sub(r"[^\w-]", "-", group or path.stem): mesh for group, mesh in meshes.items()}
     solid = any(len(mesh.p) == 3 for mesh in meshes.values())
     inside, side = ("volume", "area") if solid else ("area", "length")

@@ -18,10 +18,7 @@ JUMP = 1.0
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Sentences on couplings that do not transmit a constant pressure; for certified solutions also
-    on ties whose forces jump, and on zones that end by themselves and are smaller than FEWEST
-    elements.
-    """
+    """Sentences on couplings without constant pressure, jumping ties, and zones that are small."""
     coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:
         return coupled
@@ -34,9 +31,7 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
 
 
 def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on ties that could give up no contact where others join their bodies too, and whose
-    forces jump there: between two contacts of a cell by more than JUMP of the median traction.
-    """
+    """Sentences on ties whose forces jump by more than JUMP of the median traction."""
     if all(made.tight is None for made in reduction.couplings):
         return []
     problem, found = reduction.problem, []

@@ -74,9 +74,7 @@ def _sizes(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], list[str]]:
-    """Measure how far an answer goes beyond what is assumed: the tables `bodies` and `pairs` of a
-    summary, by the keys of BOUNDS, and one sentence for every value beyond its bound.
-    """
+    """Measure how far an answer exceeds the assumptions: tables of a summary, and sentences."""
     displaced, reactions = reduction.displaced(solution), solution.reactions.ravel()
     bodies: dict[str, dict[str, float]] = {}
     remarks: list[str] = []

@@ -310,9 +310,7 @@ def _largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix | Submatrix, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A matrix in single precision and blocks of the k nodes present, held unknowns as rows of
-    their own; each unknown's place (n,) in it; the nodes (k,).
-    """
+    """A matrix in single precision and blocks of k nodes, the places (n,) in it, the nodes (k,)."""
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim
     held = np.full(size, np.median(A.diagonal()))
@@ -329,9 +327,7 @@ def nodal_blocks(
 
 
 def _masked(whole: sp.bsr_matrix, present: np.ndarray, held: np.ndarray) -> sp.bsr_matrix:
-    """The blocks of the nodes present (k,) of a matrix in blocks of all nodes, where unknowns have
-    rows of their own whose diagonal entry is given, and not zero.
-    """
+    """The blocks of the nodes present (k,), where unknowns may have rows of their own."""
     dim = whole.blocksize[0]
     there = np.zeros(whole.shape[0] // dim, dtype=bool)
     there[present] = True
