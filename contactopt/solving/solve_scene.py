@@ -25,7 +25,16 @@ from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.transfer import transfer
-from contactopt.readings.constants import BALANCED, BEARABLE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
+from contactopt.readings.constants import (
+    BALANCED,
+    BEARABLE,
+    BORNE,
+    COARSEST,
+    FACTOR,
+    ROUGH,
+    ROUNDS,
+    SLOW,
+)
 from contactopt.readings.validity import validity
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
@@ -269,7 +278,7 @@ def _on_ground(
     seconds = Counter(solution.seconds)
     for _ in range(ROUNDS):
         left = _doubt(held, solution)
-        if left <= BALANCED or left > SLOW * before or not solution.solved:
+        if left <= BORNE or left > SLOW * before or not solution.solved:
             break
         held, before = held.pulled(solution), left
         solution = answer(held.problem, solution)
