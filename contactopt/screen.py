@@ -1,7 +1,5 @@
 """What a terminal shows: the answer of a run in tables, and a bar while something long goes on."""
 
-from __future__ import annotations
-
 import re
 import sys
 import threading

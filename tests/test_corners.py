@@ -18,6 +18,7 @@ from contactopt import (
     Scene,
     Support,
     Traction,
+    natural_map_residual,
     reduce,
     run,
     solve,
@@ -27,6 +28,7 @@ from contactopt.bodies.elements import make_basis
 from contactopt.errors import InputError
 from contactopt.methods import exchanged
 from contactopt.problem.chart import Pair
+from contactopt.problem.laws import find_law
 
 E, NU = 1e4, 0.3
 STRESS = {2: np.array([-0.6, -1.0]), 3: np.array([-0.6, -0.3, -1.0])}
@@ -144,8 +146,8 @@ def test_an_exchange_is_felt_alike_by_displacements_and_by_balance(felt, moved, 
     Q[0, 2] = coupled
     V = np.array([1.0, 0, 1, 0]) + moved * none
     problem = InterfaceProblem(1e-5 * Q, np.zeros((2, 2)), mu=0.5, V=V[:, None], s=[-1.0])
-    unfelt = exchanged.exchanges(problem, np.arange(2))[1]
-    assert unfelt.shape[1] == (max(felt, moved) < 1e-10)
+    sizes = exchanged.exchanges(problem, np.arange(2))[2]
+    assert np.sum(sizes <= exchanged.UNFELT) == (max(felt, moved) < 1e-10)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3])
@@ -159,6 +161,25 @@ def test_contacts_at_one_place_bear_alike_also_those_that_bore_nothing(share):
     given = replace(solve(problem), reactions=np.array([[share, 0.0], [1 - share, 0.0]]))
     found = exchanged.least_friction(problem, given, 1e-8)
     assert np.allclose(found.reactions, [[0.5, 0.0]] * 2) and found.residual < 1e-12
+
+
+@pytest.mark.parametrize("law", ["coulomb", "bilateral"])
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.2])
+def test_the_least_friction_obeys_the_law(law, share):
+    """A node in a corner, pulled off one face by .1: the friction of the other one, which bears 1,
+    must hold it if no contact may pull. Its forces bear any `share` more on both.
+    """
+    felt = np.array([[1.0, 0, 0, 1], [0, 1, 1, 0]])  # what moves the node along x and y
+    chart = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3).chart
+    pairs, at = (Pair("a", 0, 1, chart), Pair("b", 1, 2, chart)), np.zeros((2, 2))
+    Q, moved = felt.T @ felt, felt.T @ [-1.0, 0.1]
+    rule = find_law(law)(np.array([0.4, 0.4]))
+    problem = InterfaceProblem(Q, moved.reshape(2, 2), rule, pairs=pairs, coordinates=at)
+    start = np.array([[1.0, -0.1 - share], [share, 0.0]])
+    given = replace(solve(problem), reactions=start, residual=0.0)
+    assert natural_map_residual(problem, start, np.zeros(0)) < 1e-12
+    exact = [[1.0, -0.1], [0.0, 0.0]] if law == "coulomb" else [[1.0, 0.0], [-0.1, 0.0]]
+    assert np.allclose(exchanged.least_friction(problem, given, 1e-8).reactions, exact, atol=1e-7)
 
 
 def test_a_seat_whose_forces_have_the_least_friction_is_not_said_to_be_far_off():

@@ -5,8 +5,6 @@ about CONSTANTS / n^2 at most. The constants are those of eight scenes with know
 rule was judged by twenty others: `python -m experiments.questions.front` measures both.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, sqrt
 
@@ -37,7 +35,6 @@ SECONDS = {0: (0.015, 4e-5), 1: (0.06, 3e-4), 2: (0.06, 1.4e-3)}
 # this size, of the rest with its square
 BODY, SETTLING = 0.4, 0.6
 SAFETY = 1.5  # on the constants, for scenes of other shapes and materials
-SHARE = 0.01  # of the accuracy, which the tolerance of the solver may take
 
 
 @dataclass(frozen=True)
@@ -69,7 +66,7 @@ def propose(
         elements = max(FEWEST[degree], ceil(sqrt(SAFETY * constant / accuracy)))
         first, growing = SECONDS[degree]
         seconds = first + growing * elements**2
-        found.append(Proposal(degree, elements, SHARE * accuracy, seconds))
+        found.append(Proposal(degree, elements, 0.01 * accuracy, seconds))  # for the solver
     return min(found, key=lambda own: own.seconds, default=None)
 
 

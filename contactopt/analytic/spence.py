@@ -17,8 +17,6 @@ eigenvalue problem for elastic contact with finite friction, Proc. Camb. Phil. S
 Spence (1975), J. Elasticity 5, 297-319. Half-space: Johnson (1985), eq (2.25), (3.18).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 

@@ -1,7 +1,5 @@
 """A campaign: the unfinished runs of an experiment, executed and stored one by one."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections import Counter

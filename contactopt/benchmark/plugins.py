@@ -4,8 +4,6 @@ The campaign's process runs the file, to know what it declares; the functions ar
 only.
 """
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import sys

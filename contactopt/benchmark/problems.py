@@ -1,7 +1,5 @@
 """Problems of an experiment file: scenes, FCLib files and generated families."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

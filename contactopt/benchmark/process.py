@@ -2,8 +2,6 @@
 that it started, and what it printed last.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -2,8 +2,6 @@
 at any moment (contactopt.benchmark.process), keep what was loaded, and judge nothing.
 """
 
-from __future__ import annotations
-
 import errno
 import inspect
 import os

@@ -19,8 +19,6 @@ solution algorithm, Int. J. Numer. Meth. Engng 32, 1205-1227, for floating bodie
 multipliers of the interface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Elastic stiffness of a mesh of displacement elements."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -9,8 +7,6 @@ import scipy.sparse as sp
 import skfem
 
 from contactopt.bodies.elements import Weight, weight_at, with_jacobians
-
-PIECE = 2**18  # entries of element matrices that are held at the same time; they stay in the cache
 
 
 class Stiffness(sp.bsr_matrix):
@@ -46,7 +42,7 @@ def isotropic_stiffness(
     known += graph.indices  # ascending
     data = np.zeros((len(known), dim, dim))
     within = np.arange(dim * dim).reshape(dim, dim)
-    size = max(PIECE // (dim * nodes.shape[1]) ** 2, 1)
+    size = max(2**18 // (dim * nodes.shape[1]) ** 2, 1)  # entries stay in the cache
     for start in range(0, len(nodes), size):
         piece = np.arange(start, min(start + size, len(nodes)))
         own = nodes[piece].astype(np.int64)

@@ -59,8 +59,6 @@ Methods Appl. Mech. Eng. 186; Weiss, Wohlmuth (2009), A posteriori error estimat
 for contact problems, Math. Comp. 78.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

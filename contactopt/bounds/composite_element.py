@@ -5,8 +5,6 @@ It has as many parameters as there are moments of tractions on the boundary and 
 the parts. Here one body force serves all parts. Sources: as contactopt.bounds.tetrahedra.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

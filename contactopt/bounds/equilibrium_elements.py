@@ -23,8 +23,6 @@ for tractions as unknowns; Love (1927), A treatise on the mathematical theory of
 188, for bodies of revolution; else as contactopt.bounds.split_triangle.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from contactopt.bounds.tetrahedra import Tetrahedra
 
 
-GAIN = 0.05  # of the energy: a step that makes it less by a smaller share is the last one
 STEPS = 30  # at most
 
 
@@ -158,7 +157,7 @@ class BalancedMoments:
             step = size / float(np.sum(way * turned))
             m, left = m + step * way, left - step * turned
             twice -= step * size
-            if step * size < GAIN * twice:
+            if step * size < 0.05 * twice:  # the last step gains less of the energy
                 break
         return m
 

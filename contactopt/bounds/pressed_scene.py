@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from contactopt.bodies.protocol import Body
 
 THIN = 3e4  # length over height: half as much again is past what rounding permits
-CLEAR = 1.5  # of the bubbles that a facet beside the pressure needs, so that it stays open
 
 
 class PressedScene:
@@ -223,7 +222,7 @@ class PressedScene:
                 gap, bubble = control_points(gap, d), control_points(bubble, d)
             found = np.divide(-gap, bubble, out=np.zeros(gap.shape), where=bubble > CLOSE)
             np.maximum.at(more, points.facets[0], found.max(axis=1))
-            more[~closed.all(axis=1)] *= CLEAR
+            more[~closed.all(axis=1)] *= 1.5  # so that facets beside the pressure stay open
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))
         return out
 

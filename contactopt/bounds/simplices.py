@@ -1,7 +1,5 @@
 """Straight-edged triangles and tetrahedra: what the stresses on them need of their shape."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

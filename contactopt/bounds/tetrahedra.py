@@ -34,8 +34,6 @@ finite element methods for two-dimensional elasticity problems, Numer. Math. 30;
 Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

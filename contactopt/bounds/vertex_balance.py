@@ -1,7 +1,5 @@
 """The balance of elements at their vertices, the first step of contactopt.bounds.tetrahedra."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a mesh file holds, in words that a scene file takes: bodies, boundaries and facing pairs."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

@@ -2,8 +2,6 @@
 which is made only when it is shown.
 """
 
-from __future__ import annotations
-
 import base64
 import html
 import io

@@ -2,8 +2,6 @@
 path, for the program in pages/view.js.
 """
 
-from __future__ import annotations
-
 import csv
 from contextlib import suppress
 from pathlib import Path
@@ -32,7 +30,6 @@ from contactopt.figures.style import highest_colour, magnification
 from contactopt.scenes.kinds import KINDS
 
 NEAREST = 16  # how many times as large as the picture of a contact the bodies may be
-TURNS = 0.5  # length of the mean of unit normals below which a surface goes around something
 # cosine of the angle between two faces from which on their edge is drawn
 SHARP = np.cos(np.deg2rad(30))
 # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut: such
@@ -260,7 +257,7 @@ def _contact(
         "lift": packed_short(motion[1]),
         "cells": packed(flat),
         "lines": packed(block.data if line else np.zeros((0, 2), dtype=int)),
-        "normal": (mean / size).tolist() if size > TURNS else None,
+        "normal": (mean / size).tolist() if size > 0.5 else None,  # not around something
         "peak": float(pressure.max(initial=0.0)),
         "place": packed(interface["x"][own].T),
         "states": {

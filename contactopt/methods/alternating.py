@@ -11,8 +11,6 @@ asked for again at tighter settings. The backend `pcg`, for both problems, forms
 active sets and conjugate gradients with the preconditioners of contactopt.methods.preconditioners.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -12,8 +12,6 @@ Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual 
 for three-dimensional contact problems with Coulomb friction.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

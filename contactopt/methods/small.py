@@ -4,8 +4,6 @@ need no scaling. What they do not solve goes on as without them, and so does eve
 package was installed without a compiler.
 """
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

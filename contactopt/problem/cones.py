@@ -6,8 +6,6 @@ A function that ends in `_derivative` gives the nearest points and the generalis
 projection.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 DIRECTIONS = 16  # of the polygon in a disc

@@ -2,8 +2,6 @@
 something within one pair only.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

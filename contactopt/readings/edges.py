@@ -21,8 +21,6 @@ zone nearer to a rectangle than to an ellipse, half of the side of the square wi
 Where an end cannot be read, the nodal areas are counted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -52,7 +50,6 @@ from contactopt.readings.patches import End, is_round, patches_of
 from contactopt.readings.peaks import Peak, Reading, neighbours
 from contactopt.scenes.scene import Scene
 
-LEVEL = 0.9  # least cosine between normals of a zone in space and their mean that has a half-width
 Read = tuple[float, float]  # a distance and its uncertainty
 Reader = Callable[[End], Read | None]
 
@@ -79,7 +76,7 @@ def is_level(problem: InterfaceProblem, frames: np.ndarray, reactions: np.ndarra
     if problem.dim == 2 or not len(normals):
         return True
     mean = normals.mean(axis=0)
-    return bool(np.min(normals @ mean) > LEVEL * np.linalg.norm(mean))
+    return bool(np.min(normals @ mean) > 0.9 * np.linalg.norm(mean))  # least cosine with the mean
 
 
 def _is_ring(scene: Scene, problem: InterfaceProblem) -> bool:

@@ -6,8 +6,6 @@ disc about its centre, seen as one end, or an ellipse: lengths along its axes ar
 becomes the disc of the same area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,8 +18,6 @@ from contactopt.readings.constants import RING, ROUNDNESS
 
 # distances that differ by less than this fraction of an element belong to one ring of nodes
 SAME = 1e-5
-# between 1, of a disc, and 1.25, of a square: the farthest point over that of a disc
-FARTHEST = 1.12
 
 # rings of nodes next to the edge: how many are left out, how many are fitted
 Window = tuple[int, int]
@@ -238,7 +234,7 @@ def is_round(problem: InterfaceProblem, inside: np.ndarray) -> bool:
     x = _from_centre(problem, inside, areas)
     scaled, _ = _as_disc(problem, x, inside, areas)
     disc = np.sqrt(areas[inside].sum() / np.pi)
-    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= FARTHEST * disc)
+    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= 1.12 * disc)  # a disc has 1
 
 
 def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -41,9 +41,6 @@ if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
 
 LARGEST = "von_mises"
-# how far beyond the coordinates of a body a point may lie before anything is solved, over its size
-OUTSIDE = 0.05
-DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
 RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
 AROUND = {2: 9, 3: 17}  # vertices among which a local maximum is the largest, itself among them
 NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
@@ -160,7 +157,7 @@ def check_there(name: str, part: Part, region: Region, scene: Scene, meeting: bo
     if region.point:
         corners = straight(mesh).p
         low, high = corners.min(axis=1), corners.max(axis=1)
-        slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)
+        slack = 0.05 * (high - low).max() + (region.radius or 0.0)  # of the body's size
         if np.any(region.point < low - slack) or np.any(region.point > high + slack):
             raise InputError(
                 f"quantity {name!r}: the point ({_words(region)}) lies outside body"
@@ -214,7 +211,7 @@ def read_stress(
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))
-    scatter = DEVIATIONS * recovered.deviation(U, slopes)
+    scatter = 2 * recovered.deviation(U, slopes)  # standard errors hold 95 of 100
     above = sizes + scatter - sizes[top]
     doubtful = (above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0))
     slopes[np.arange(len(slopes)) != top] = 0.0

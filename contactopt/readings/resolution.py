@@ -2,8 +2,6 @@
 says nothing of the mesh.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.checks import place_words
@@ -19,7 +17,6 @@ FEWEST = 4
 # of the median traction, between neighbours on a tie that is joined more than once: right forces on
 # a few coarse seams jumped by about 0.3, and alternating ones by 2 and more
 JUMP = 1.0
-APART = 0.05  # relative difference of two readings of the largest pressure that is told
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
@@ -83,7 +80,7 @@ def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, in
 
 def smoothed(peak: Reading, largest: float) -> list[str]:
     """One sentence where the largest pressure at a node is not the one that is read around it."""
-    if abs(largest - peak.value) <= APART * abs(largest):
+    if abs(largest - peak.value) <= 0.05 * abs(largest):  # two readings agree
         return []
     return [
         f"the largest pressure at a node is {largest:.4g}, and its"

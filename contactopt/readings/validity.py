@@ -5,8 +5,6 @@ bounds of the table below is computed from the displacements of the bodies alone
 factors that made the interface problem.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

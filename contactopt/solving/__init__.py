@@ -2,8 +2,6 @@
 loops around it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from contactopt.errors import Unbalanced

@@ -2,8 +2,6 @@
 (contactopt.solving.paths).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sized
 from dataclasses import replace
 from typing import Any

@@ -2,8 +2,6 @@
 is left.
 """
 
-from __future__ import annotations
-
 import math
 import resource
 import sys

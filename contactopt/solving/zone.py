@@ -2,8 +2,6 @@
 4.2).
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ gap / step, H the contact velocities of the bodies' velocities. More contact com
 freedom: W is sparse and of deficient rank.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp

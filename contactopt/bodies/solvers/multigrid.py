@@ -15,8 +15,6 @@ Sources: Vanek, Mandel, Brezina (1996), Algebraic multigrid by smoothed aggregat
 fourth order elliptic problems; Lottes (2023), Optimal polynomial smoothers for multigrid V-cycles.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from threading import Lock
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The grid of the contacts: a line, a closed curve or a rectangle that transforms work on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
