@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from contactopt.cards import count as said
 from contactopt.errors import Damaged, InputError
 from contactopt.meshes.inp_text import text_of
 
