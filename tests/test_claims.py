@@ -14,7 +14,7 @@ from contactopt import InputError, Part, Plate, Rigid, Scene, Support
 from contactopt.accuracy import loop, refine
 from contactopt.accuracy.everywhere import SAFETY
 from contactopt.accuracy.indicators import ElementErrors, misfit
-from contactopt.accuracy.locally import Locally
+from contactopt.accuracy.locally import SLOW, Locally, remaining
 from contactopt.accuracy.marking import balanced, divisible, overlooked
 from contactopt.accuracy.polygon import chords_of, flatter
 from contactopt.readings.edges import width_reading
@@ -255,3 +255,14 @@ def test_a_peak_that_falls_is_no_rival_of_the_largest():
     assert excess(8.5) == pytest.approx(0.5)
     assert excess(10.5) == 0.0
     assert excess(12.5) == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.5, SLOW])
+def test_the_error_of_a_path_is_claimed_from_its_changes(ratio):
+    """Errors that fall by a ratio: the claim covers them and is at most four times as large."""
+    errors = ratio ** np.arange(4.0)
+    for meshes in (2, 3, 4):
+        claim = remaining(np.diff(errors[:meshes])[-2:]) / errors[meshes - 1]
+        assert 1 - 1e-9 <= claim <= (4 if meshes > 2 or ratio > 0.4 else 6)
+    assert remaining(np.array([-5.05, 2.43])) >= 4.5  # of an interference fit, whose values scatter
+    assert remaining(np.array([0.0604e-3])) / 0.0140289 >= 0.005  # of a lap joint, on two meshes

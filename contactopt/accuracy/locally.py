@@ -33,7 +33,22 @@ from contactopt.solving.solve_scene import Options, Solved, solve_scene
 # and 1
 SHARE = 0.6
 LESS = 0.25  # by how much the change of a path falls at most from one mesh to the next
+# share of its error that a refinement leaves at corners: what is marked makes SHARE, and is halved
+SLOW = 1 - SHARE / 2
 USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given
+
+
+def remaining(changes: np.ndarray) -> float:
+    """The error of a load path after the last one or two `changes` of its value, in their order.
+
+    It falls by the observed ratio in every refinement, at most by LESS and at least by SLOW, which
+    is taken where there is one change. Changes of both signs scatter: then the larger one counts.
+    """
+    last, before = abs(changes[-1]), abs(changes[-2]) if len(changes) > 1 else 0.0
+    ratio = min(last / before, SLOW) if before > 0 else SLOW
+    scatters = len(changes) > 1 and changes[0] * changes[1] < 0
+    least = SAFETY[3] * max(last, before * (1.0 if scatters else LESS))
+    return float(max(least, last * ratio / (1 - ratio)))
 
 
 class Locally:
@@ -93,7 +108,7 @@ class Locally:
         if not len(changes):
             size = np.inf
         elif solved.path is not None:  # nothing but the changes tells the error of a whole path
-            size = SAFETY[3] * float(np.max(changes * (1.0, LESS)[: len(changes)]))
+            size = remaining(np.diff(self.values[-3:]))
         else:  # no adjoint: what a refinement changed, twice
             size = 2 * float(np.max(changes))
         mesh = np.nan if solved.path is not None else -last.total

@@ -90,7 +90,7 @@ class PressedScene:
             return None
         elements = elements_of(body)
         if elements is None:
-            raise InputError(f"body '{body.name}' has no elements here; a bound needs them.")
+            raise InputError(f"body '{body.name}' has no elements, which a bound needs.")
         mesh, degree, name = elements.basis.mesh, elements.degree, f"body '{body.name}'"
         shape = mesh.refdom.__name__
         linear = ("RefQuad",) if degree == 1 else ()
