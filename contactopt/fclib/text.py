@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.cards import count as said
 from contactopt.errors import InputError
 from contactopt.linear.operators import Interface
 from contactopt.problem import InterfaceProblem
@@ -25,9 +26,8 @@ class _Numbers:
 
     def floats(self, count: int) -> np.ndarray:
         if count < 0 or count > len(self.words) - self.at:
-            raise InputError(
-                f"it announces {count} numbers where {len(self.words) - self.at} are left"
-            )
+            left = len(self.words) - self.at
+            raise InputError(f"it announces {said(count, 'number')} where the text has {left} more")
         self.at += count
         return np.array(self.words[self.at - count : self.at], dtype=float)
 
