@@ -25,9 +25,7 @@ def line(name: str, *facts: str) -> str:
 
 
 def card(title: str, rows: Mapping[str, object], table: Sequence[Sequence[str]] = ()) -> str:
-    """Write a small HTML table of names and values, for notebooks, above it if it is given another
-    whose first row is the head. All texts are escaped.
-    """
+    """Write an HTML table of escaped names and values, below one with a head if that is given."""
     names = "".join(
         f'<tr><th scope="row" style="text-align:left">{html.escape(str(name))}</th>'
         f'<td style="text-align:left">{html.escape(str(value))}</td></tr>'

@@ -1,6 +1,4 @@
-"""Meshes that are given, or made once, and then divided: where the quantity needs it, or
-everywhere.
-"""
+"""Meshes that are given, or made once, and then divided, everywhere or where it is needed."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -130,9 +128,7 @@ class Locally:
     def advance(
         self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
     ) -> float:
-        """Divide elements, around contacts where the mesh is too coarse to know and around local
-        maxima that may be the largest, too; returns how many unknowns the next mesh has.
-        """
+        """Divide elements, also at unresolved contacts and rival maxima; returns the unknowns."""
         marked = None
         if not self.whole:
             assert self.last is not None

@@ -71,9 +71,7 @@ def refine(
 
 
 def _in_time(options: Options, accuracy: float) -> Options:
-    """Options with which solvers stop at a tenth of the accuracy, small enough for derivatives,
-    unless another tolerance is asked for.
-    """
+    """Options with which solvers stop at a tenth of the accuracy, unless a tolerance is given."""
     if options.tol != TOL:
         return options
     return replace(options, tol=max(TOL, min(CERTIFIED, 0.1 * accuracy)))  # a tenth is the solver's
@@ -196,9 +194,7 @@ class _Loop:
         return found, excess
 
     def _before(self, peak: Peak) -> tuple[float, float]:
-        """The value of a peak, and the largest value, on the last mesh of larger elements there;
-        else a share of its value. (What nodes scatter about a fit is large on every mesh.)
-        """
+        """The value of a peak, and the largest one, on the last mesh of larger elements there."""
         for earlier in reversed(self.peaks[:-1]):
             away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]
             larger = [

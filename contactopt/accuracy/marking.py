@@ -111,9 +111,7 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
 
 
 def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
-    """The scene with the marked elements of every body divided (None: all), and facets that face
-    much finer ones with them (`balanced`), until none is left.
-    """
+    """The scene with marked elements (None: all) divided, and facets that face much finer ones."""
     if marked is None:
         return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
     for _ in range(6):  # of divisions that keep facing facets about as long as each other
@@ -148,9 +146,7 @@ def unknowns(scene: Scene) -> int:
 
 
 def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Mark more elements so that surfaces that face each other stay about as fine: a much finer one
-    sees the other as a polygon, whose corners press ever harder.
-    """
+    """Mark more elements, so that surfaces that face each other stay about as fine."""
     chosen = [set(elements.tolist()) for elements in marked]
     names = [part.name for part in scene.parts]
     for pair in scene.pairs:

@@ -185,9 +185,7 @@ def _excess(punch: UnitPunch, mu: float) -> float:
 
 
 def _uncoupled(mu: float, beta: float, axisymmetric: bool) -> float:
-    """ln artanh(c/a) without beta q: K'(k)/K(k) = beta/mu in plane strain, b / tanh b = (mu/beta)
-    K'(k) on a circle.
-    """
+    """ln artanh(c/a) without beta q: K'(k)/K(k) or, on a circle, b / tanh b from beta and mu."""
 
     from scipy.optimize import brentq
     from scipy.special import ellipkm1

@@ -139,9 +139,7 @@ def bare_surface(
     every: bool,
     coupled: sp.csr_matrix | None,
 ) -> BareSurface:
-    """The trace of the displacement on facets (f, j) with outward normals (dim, f); `coupled` as in
-    turned_outwards, other arguments as in contactopt.bodies.elements.contact_trace.
-    """
+    """The trace on facets (f, j) with normals (dim, f); arguments as in contact_trace."""
     dim, (kind, corners) = len(points), KINDS[len(points), facets.shape[1]]
     if (dim, facets.shape[1]) == (2, 3) and coupled is not None:
         many = np.median(np.diff(coupled.indptr)[facets[:, 2]]) > 6  # nodes of a triangle

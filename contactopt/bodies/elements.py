@@ -296,9 +296,7 @@ def mean_normals(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> n
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Hat functions (v, point) on a cell, and the points (dim - 1, q) and weights (q,) of the
-    reference face's rule of one rule per cell.
-    """
+    """Hat functions (v, point) on a cell, and the reference face's points and weights (q,)."""
     face, hat = FACES[name][:2]
     points, share = get_quadrature(face, degree + 2)
     phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])

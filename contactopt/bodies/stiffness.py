@@ -10,10 +10,7 @@ from contactopt.bodies.elements import Weight, weight_at, with_jacobians
 
 
 class Stiffness(sp.bsr_matrix):
-    """A matrix in blocks of nodes, which take three quarters of the memory of compressed rows.
-
-    Indexing gives compressed rows of what is asked for.
-    """
+    """A matrix in blocks of nodes, which need less memory; indexing gives compressed rows."""
 
     def __getitem__(self, key: Any) -> Any:
         return self.tocsr()[key]

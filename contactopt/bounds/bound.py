@@ -151,9 +151,7 @@ class Bound:
     def balanced_with(
         self, tractions: np.ndarray, multipliers: np.ndarray, forces: tuple[Any, ...] | None = None
     ) -> Data:
-        """Stresses in equilibrium with contact tractions and the loads; of an adjoint with the
-        `forces` on its bodies in their place, where the forces A u_h are those of the stress of v.
-        """
+        """Stresses in equilibrium with contact tractions and loads, or an adjoint's `forces`."""
         scene, out = self.scene, list[Any]()
         own = scene.reduction.own_multipliers(multipliers)
         for i, (body, cells) in enumerate(zip(scene.bodies, scene.cells)):

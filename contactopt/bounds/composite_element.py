@@ -19,9 +19,7 @@ def components() -> list[tuple[int, int]]:
 
 @cache
 def reference_stress() -> np.ndarray:
-    """The stress (value, component, input) of the reference element by the inputs: moments of
-    tractions, then a body force. Integrals of products are WEIGHT times sums over the values.
-    """
+    """The stress (value, component, input) by inputs; integrals are WEIGHT times sums."""
     d = 3
     x = np.concatenate([np.zeros((1, d)), np.eye(d)])
     pairs, n = components(), d + 1

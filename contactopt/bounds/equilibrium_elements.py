@@ -62,9 +62,7 @@ class _Elements(NamedTuple):
 
 
 class _System(NamedTuple):
-    """All elements, the second derivative K of half the energy by all tractions, and the program
-    for those that are to be found.
-    """
+    """All elements, half the energy's second derivative by tractions, and the program for these."""
 
     parts: list[_Elements]
     K: sp.csr_matrix

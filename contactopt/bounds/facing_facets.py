@@ -169,9 +169,7 @@ class FacingFacets:
         nodal[side.body][:] += side.sign * self.frame[component][:, None] * added
 
     def moments(self, number: int, tractions: np.ndarray) -> np.ndarray:
-        """(v, f, dim) of tractions (k, dim) on one of the sides with the hat functions. Next to an
-        axis of revolution they are those of the linear traction that is zero there.
-        """
+        """(v, f, dim) of tractions (k, dim) on a side with hat functions, zero on an axis."""
         side, points = self.sides[number], self.rule
         t = self.of_contacts(tractions)[:, points.facets[0]] @ self.frame  # (v, S, dim)
         own = np.einsum(

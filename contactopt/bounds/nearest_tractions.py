@@ -49,9 +49,7 @@ STEPS = 30  # at most
 
 
 class ForceResponse(NamedTuple):
-    """The degree of a body's displacements, and those (dim, nodes) under nodal forces per
-    thickness.
-    """
+    """The degree of displacements, and those (dim, nodes) under forces per thickness."""
 
     degree: int
     moved: Callable[[np.ndarray], np.ndarray]

@@ -253,9 +253,7 @@ class PressedScene:
     def boundary(
         self, number: int, tractions: np.ndarray, loaded: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Body force (dim,), held components (facets, dim) and moments of tractions (facets, dim,
-        dim) of a body, as Tetrahedra.equilibrated() takes them; not `loaded`: of the contact alone.
-        """
+        """Body force, held components and moments, as Tetrahedra.equilibrated() takes them."""
         scene, mesh, d = self.reduction.scene, self.cells[number].mesh, self.problem.dim
         part: Any = scene.parts[number]
         force, components = np.zeros(d), scene.components

@@ -11,9 +11,7 @@ from skfem import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Simplices:
-    """Straight-edged triangles or tetrahedra of scikit-fem, with displacements and stresses on
-    them.
-    """
+    """Straight-edged triangles or tetrahedra, with displacements and stresses on them."""
 
     mesh: Mesh
 

@@ -1,7 +1,5 @@
 """The mortar coupling of bodies whose contact nodes do not match, from faces to the maps T."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 

@@ -65,9 +65,7 @@ class Whole(NamedTuple):
 
 
 class Square:
-    """LU of the transpose of a matrix S (m, m), which is overwritten. To a singular S sigma W Z' is
-    added, with W and Z its null vectors from the left and the right.
-    """
+    """LU of the transpose of S (m, m), overwritten; null vectors make a singular S regular."""
 
     def __init__(self, S: np.ndarray):
         self.W, self.sigma = np.zeros((len(S), 0)), 0.0

@@ -1,6 +1,4 @@
-"""What the page of a run shows, read from the files of the run: bodies, contact surfaces and load
-path, for the program in pages/view.js.
-"""
+"""What the page of a run shows, read from its files, for the program in pages/view.js."""
 
 import csv
 from contextlib import suppress
@@ -120,9 +118,7 @@ def whole_box(box: np.ndarray, mirrors: list[list[Any]]) -> np.ndarray:
 def _boxes(
     pairs: dict[str, Any], box: np.ndarray, mirrors: list[list[Any]], dim: int
 ) -> list[np.ndarray]:
-    """For each pair the box (2, 3) of the picture of its contact, with mirror images: about what
-    touches; in the plane, where nothing hides another pair, about all that touches.
-    """
+    """For each pair the box (2, 3) of the picture of its contact, with mirror images."""
     found, least = [], float(np.ptp(box, axis=0).max()) / NEAREST
     for mesh in pairs.values():
         pressure = mesh.point_data["contact_pressure"]

@@ -134,10 +134,7 @@ def _shown(
     if extent == 0 or 6.0 * extent > np.ptp(place):  # then the zone is drawn alone
         return None, None
     low, high = touching.min() - extent, touching.max() + extent
-    return (
-        low / unit if low > place.min() else None,
-        high / unit if high < place.max() else None,
-    )
+    return (low / unit if low > place.min() else None, high / unit if high < place.max() else None)
 
 
 def _about_origin(

@@ -62,11 +62,7 @@ def make_axes(ax: Axes) -> Any:
 
 
 def paper_axes(
-    columns: int = 1,
-    rows: int = 1,
-    wide: bool = False,
-    height: float = HEIGHT,
-    placed: bool = True,
+    columns: int = 1, rows: int = 1, wide: bool = False, height: float = HEIGHT, placed: bool = True
 ) -> tuple[Any, np.ndarray]:
     """A figure of one or two columns of a journal, and its flat axes; row `height` in inches."""
     from matplotlib.figure import Figure

@@ -4,8 +4,6 @@ meshio numbers the names of markers, and may give two of them one number. What i
 refused with its line. Source: SU2, documentation of version 8, "Mesh file".
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

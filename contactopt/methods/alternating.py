@@ -32,10 +32,7 @@ PCG = "pcg"  # the backend that needs no entry of Q
 
 
 class TwoStage(Method):
-    """The iteration, for any two solvers of the normal and of the tangential problem.
-
-    relaxation  fraction of each new tangential force that is taken, above 0 and at most 1
-    """
+    """The iteration with any two solvers; `relaxation` is the share of new tangential forces."""
 
     relaxation: float
 

@@ -12,11 +12,7 @@ from contactopt.checks import check_number
 from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
-from contactopt.linear.operators import (
-    Interface,
-    form,
-    has_entries,
-)
+from contactopt.linear.operators import Interface, form, has_entries
 from contactopt.methods import (
     NoSolution,
     Repeated,

@@ -94,9 +94,7 @@ class Newton(Method):
 
 
 class Contacts:
-    """Newton's method on the equations of the contacts, by factors of an array or a sparse Q, or by
-    products with Q to the accuracy that a step is worth.
-    """
+    """Newton's method on the contacts' equations, by factors of Q or by products with Q."""
 
     def __init__(self, problem: InterfaceProblem, preconditioner: str | None, by_products: bool):
         self.problem, self.equations = problem, coulomb_equations(problem)

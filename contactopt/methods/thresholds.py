@@ -110,9 +110,7 @@ def _parts(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 def thresholds(
     problem: InterfaceProblem, shape: np.ndarray, energy: bool
 ) -> tuple[Thresholds, Thresholds, bool]:
-    """The guaranteed thresholds of a dimensionless problem with coefficients mu * `shape`, those
-    at which uniform slip fails, and whether both are the same. `energy`: Q is symmetric.
-    """
+    """Guaranteed thresholds of mu * `shape`, those of uniform slip, and whether both agree."""
     low, high = Thresholds(0.0, 0.0, 0.0), _uniform_slip(problem, shape)
     if not energy:
         high = Thresholds(high.unique, np.nan, np.nan)

@@ -1,6 +1,4 @@
-"""One pair of surfaces of an interface problem, taken alone: places on a contact surface mean
-something within one pair only.
-"""
+"""One pair of surfaces of an interface problem, taken alone."""
 
 from dataclasses import replace
 

@@ -69,9 +69,7 @@ def contact_area(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
 
 
 def is_level(problem: InterfaceProblem, frames: np.ndarray, reactions: np.ndarray) -> bool:
-    """Whether a zone of contact on a surface in space has a half-width: where it bends around a
-    body, as in a press fit, its area alone has a meaning. `frames` (k, dim, dim) are the contacts'.
-    """
+    """Whether a zone in space has a half-width: not where it bends around a body."""
     normals = frames[contact_status(problem, reactions).touching, 0]
     if problem.dim == 2 or not len(normals):
         return True
@@ -188,9 +186,7 @@ def _half_width(
     read: Reader,
     least: float,
 ) -> tuple[float, float]:
-    """Half-width of the zone `inside`, from the readings of its ends, and its uncertainty, at least
-    `least` elements. `weights` (k,) average the centre of a zone on a surface.
-    """
+    """Half-width of the zone `inside` from readings of its ends, and its uncertainty."""
     area, counted = float(problem.areas[inside].sum()), _counted(scene, problem, inside)
     if ring := _is_ring(scene, problem):  # half of the width of the ring, along its section
         around = 2 * np.pi * np.abs(problem.coordinates[0])

@@ -61,9 +61,7 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
 def pressure_distribution(
     problem: InterfaceProblem, solution: Solution, bins: int = 50
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The distribution of the pressure over the real contact area: the edges (bins + 1,) of the
-    intervals [stress], and the density (bins,) [1 / stress], whose integral is one.
-    """
+    """Edges [stress] and density [1 / stress] of the pressure over the real contact area."""
     touching = contact_status(problem, solution.reactions).touching
     pressure = solution.reactions[touching, 0] / problem.areas[touching]
     density, edges = np.histogram(pressure, bins, weights=problem.areas[touching], density=True)

@@ -168,9 +168,7 @@ def least(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
-    """The connected patches of a zone `inside` (k,), in their order along a contact line. On a
-    surface one disc about its mean place by `weights` (k,), or none where it is no disc.
-    """
+    """The connected patches of a zone along a line in order, on a surface one disc or none."""
     if problem.dim == 3:
         disc = _disc(problem, inside, weights)
         return [] if disc is None else [disc]
@@ -227,9 +225,7 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
 
 
 def is_round(problem: InterfaceProblem, inside: np.ndarray) -> bool:
-    """Whether a zone on a surface is nearer to an ellipse than to a rectangle: scaled to equal
-    axes, the first reaches as far as the disc of its area, the second 1.25 times as far.
-    """
+    """Whether a zone on a surface, scaled to equal axes, is more an ellipse than a rectangle."""
     areas = problem.areas
     x = _from_centre(problem, inside, areas)
     scaled, _ = _as_disc(problem, x, inside, areas)

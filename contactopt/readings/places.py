@@ -128,9 +128,7 @@ def check_meshed(name: str, body: str, scene: Scene) -> None:
 
 
 def check_there(name: str, part: Part, region: Region, scene: Scene, meeting: bool = False) -> None:
-    """InputError for a boundary that the body's first mesh lacks, and for a point far outside. As
-    in Support, 'a/b' may be where the boundaries a and b meet, if that is allowed.
-    """
+    """InputError for a boundary that the body's first mesh lacks, or a point far outside."""
     from contactopt.meshes.cells import straight
 
     mesh = part.build_mesh(scene.elements, scene.zone)
@@ -191,10 +189,7 @@ def _around(name: str, where: str, scene: Scene) -> Region:
 def read_stress(
     place: Place, reduction: Reduction, displaced: tuple[np.ndarray, ...]
 ) -> StressReading:
-    """Read the stress that a quantity names from the displacements U (n,) of all bodies [length].
-
-    InputError for a boundary that the body does not have, and a point outside the body.
-    """
+    """Read the stress that a quantity names; InputError for a missing boundary or point."""
     from contactopt.bodies.fields import von_mises, von_mises_slopes
 
     number, recovered = _map_of(place, reduction)
@@ -240,9 +235,7 @@ def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tup
 
 
 def place_seeds(place: Place, state: State) -> Seeds:
-    """The slopes of a quantity at a place. A stress is a function of the displacement U of its
-    body, which free motions do not strain; a largest one is differentiated where it is.
-    """
+    """The slopes of a quantity at a place; a largest stress is differentiated where it is."""
     if place.kind == "pressure":
         return Functional(pressure_weights(place, state.reduction))(state)
     found = read_stress(place, state.reduction, state.displaced)

@@ -133,9 +133,7 @@ def elastic_energy(reduction: Reduction, solution: Solution) -> float:
 def _of_pair(
     read: Reader, slopes: Callable[[State, int], Seeds]
 ) -> Callable[[str, str, Scene], Quantity]:
-    """A row whose quantity is read from the forces on one pair of surfaces; of the pressure also
-    that at one contact, by its number.
-    """
+    """A row whose quantity is read from the forces on one pair, of pressure also at a contact."""
 
     def make(name: str, rest: str, scene: Scene) -> Quantity:
         if read is pressure_reading and rest.isdigit():

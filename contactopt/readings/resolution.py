@@ -1,6 +1,4 @@
-"""Whether the mesh resolves the contact at all: remarks for people, on answers whose certificate
-says nothing of the mesh.
-"""
+"""Whether the mesh resolves the contact, of which the certificate says nothing: remarks."""
 
 import numpy as np
 
@@ -20,10 +18,7 @@ JUMP = 1.0
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Sentences on couplings that do not transmit a constant pressure; for certified solutions also
-    on ties whose forces jump, and on zones that end by themselves and are smaller than FEWEST
-    elements.
-    """
+    """Sentences on couplings without constant pressure, jumping ties, and zones that are small."""
     coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:
         return coupled
@@ -36,9 +31,7 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
 
 
 def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on ties that could give up no contact where others join their bodies too, and whose
-    forces jump there: between two contacts of a cell by more than JUMP of the median traction.
-    """
+    """Sentences on ties whose forces jump by more than JUMP of the median traction."""
     if all(made.tight is None for made in reduction.couplings):
         return []
     problem, found = reduction.problem, []
@@ -64,9 +57,7 @@ def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
 
 
 def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
-    """The pairs of surfaces whose zone of contact is smaller than the mesh can show: name and
-    number of contacts of each, with the numbers of those that touch.
-    """
+    """Name, number of contacts and touching ones of pairs whose zone the mesh cannot show."""
     found = []
     for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):
         problem = view.problem

@@ -1,7 +1,5 @@
 """Which surfaces of which bodies may touch, and under which law."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,6 +1,4 @@
-"""Bounds on what a search for an accuracy may take, and the sentences that say which of them ended
-it.
-"""
+"""Bounds on a search for an accuracy, and the sentences that say which of them ended it."""
 
 from dataclasses import dataclass
 

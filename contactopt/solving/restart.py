@@ -226,9 +226,7 @@ def make_restart(
     path: bool,
     note: Callable[[str], None],
 ) -> Restart:
-    """What keeps the states of a run in the folder `out`, with those that it resumes there, or of
-    the run in `start`; `path`: whether it has a load path. `note` is told where there are none.
-    """
+    """What keeps the states of a run in `out`, and resumes those there or of the run `start`."""
     file = None if out is None else Path(out) / FILE
     if not resume:
         return Restart(file, None if start is None else read_known(start), path)

@@ -70,9 +70,7 @@ def unheld_words(
     last: tuple[Solution, np.ndarray],
     names: tuple[str, str],
 ) -> str:
-    """One sentence on a state that is known to have no solution, by the sentence on its load, after
-    a solved state, of which the solution and the resultants s are given. `names` are of both.
-    """
+    """One sentence on a state without a solution, after a solved state, by that on its load."""
     (solution, held), (state, before) = last, names
     if slid := sliding(problem, solution, solution):
         return sliding_words(slid, scene, state, before)

@@ -151,9 +151,7 @@ def solve_scene(
         return solved
     solution = solved.solution
     solution = replace(
-        solution,
-        seconds=solution.seconds | {"given up": gone},
-        notes=(*solution.notes, *notes),
+        solution, seconds=solution.seconds | {"given up": gone}, notes=(*solution.notes, *notes)
     )
     return replace(solved, solution=solution, turned=turned)
 

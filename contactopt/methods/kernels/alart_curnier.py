@@ -75,9 +75,7 @@ def definite(Q: np.ndarray | sp.csr_array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Sticking:
-    """Steps through the bonded system of elastic bodies that a plate presses together, while few
-    contacts are open or slip; else by `others`.
-    """
+    """Steps through the bonded system of pressed elastic bodies while few contacts differ."""
 
     bonded: Bonded
     others: Factored
