@@ -41,7 +41,6 @@ def pressed(
     load=("up", -10.0),
     units=("mm", "MPa"),
     mesh=None,
-    law="coulomb",
 ):
     one = Part(
         "one",
@@ -51,7 +50,7 @@ def pressed(
         contact="low",
     )
     two = Part("two", block(*lower), materials[1], (Support("low"),), contact="up")
-    return Scene("s", bodies=(one, two), contacts=(Contact("one", "two", 0.3, law),), units=units)
+    return Scene("s", bodies=(one, two), contacts=(Contact("one", "two", 0.3),), units=units)
 
 
 def said(scene):
@@ -104,7 +103,6 @@ WRONG = {
     "metres": (dict(upper=((0, 0.01), (0, 0.01))), "body 'two' is 1581 times as large as 'one'"),
     "apart": (dict(upper=((0, 10), (100, 110))), "100 mm or more apart"),
     "overlap": (dict(upper=((0, 10), (-5, 5))), "overlap by up to 5 mm"),
-    "mu without friction": (dict(law="tied"), "reads no mu, so its mu has no effect"),
 }  # fmt: skip
 
 

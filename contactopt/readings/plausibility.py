@@ -13,7 +13,6 @@ from contactopt.cards import count
 from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
-from contactopt.problem.laws import find_law
 from contactopt.scenes.material_library import STRESSES
 from contactopt.scenes.matrix_part import MatrixPart
 from contactopt.scenes.scene import Part, Scene
@@ -49,12 +48,6 @@ def doubts(
     if not any(_pushed(state, couplings) for state in states or (scene,)):
         found.append(UNPUSHED)
     found += _missing_planes(scene, planes)
-    found += [
-        f"contact '{pair.name}': the law '{pair.law}' reads no mu, so its mu has no effect; leave"
-        " it out, or name a law with friction."
-        for pair in scene.pairs
-        if not find_law(pair.law).frictional and (callable(pair.mu) or np.any(pair.mu))
-    ]
     return [*found, *_stiffness(scene), *_sizes(scene), *_gaps(scene, couplings)]
 
 
