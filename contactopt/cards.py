@@ -1,8 +1,7 @@
 """Short texts about results: one line for a terminal, a small table for a notebook."""
 
-from __future__ import annotations
-
 import html
+import re
 from collections.abc import Mapping, Sequence
 
 FORCES = {
@@ -26,9 +25,7 @@ def line(name: str, *facts: str) -> str:
 
 
 def card(title: str, rows: Mapping[str, object], table: Sequence[Sequence[str]] = ()) -> str:
-    """Write a small HTML table of names and values, for notebooks, above it if it is given another
-    whose first row is the head. All texts are escaped.
-    """
+    """Write an HTML table of escaped names and values, below one with a head if that is given."""
     names = "".join(
         f'<tr><th scope="row" style="text-align:left">{html.escape(str(name))}</th>'
         f'<td style="text-align:left">{html.escape(str(value))}</td></tr>'
@@ -43,7 +40,8 @@ def card(title: str, rows: Mapping[str, object], table: Sequence[Sequence[str]] 
 def columns(table: Sequence[Sequence[str]], caption: str = "") -> str:
     """An HTML table below a caption, whose first row is the head. All texts are escaped."""
     head, *rows = ([html.escape(cell).replace("\n", "<br>") for cell in row] for row in table)
-    top = "".join(f'<th scope="col">{cell}</th>' for cell in head)
+    long = (re.sub(r"([.-])(?=[^\W\d])", r"\1<wbr>", cell) for cell in head)  # names break there
+    top = "".join(f'<th scope="col">{cell}</th>' for cell in long)
     body = "".join(
         f'<tr><th scope="row">{name}</th>' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
         for name, *cells in rows

@@ -1,6 +1,4 @@
-"""Checks of numbers that a user gives, each with one sentence that says what is wrong; and warnings
-that are given once.
-"""
+"""Checks of numbers, each with one sentence that says what is wrong, and warnings said once."""
 
 from __future__ import annotations
 
@@ -38,9 +36,7 @@ OF_BODIES = ("coupling.mortar", "bodies.rigid", "meshes.mesh_repair", "meshes.me
 def check_number(
     name: str, value: float, low: float = -np.inf, high: float = np.inf, closed: bool = False
 ) -> None:
-    """Raise InputError unless a value is a finite number in (low, high), or in [low, high) when
-    `closed`. Text and masked values are no numbers. The message calls the value by its `name`.
-    """
+    """Raise InputError, which says `name`, unless a number is in (low, high) or [low, high)."""
     try:
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
     except (TypeError, ValueError, OverflowError):
@@ -170,9 +166,7 @@ def place_words(x: Iterable[float]) -> str:
 
 
 def short(value: object, most: int = 60) -> str:
-    """Write a value as Python does. A text of more than `most` characters is cut to three
-    quarters of them, with three dots in the middle.
-    """
+    """Write a value as Python does, a text cut to about `most` characters."""
     text = repr(value)
     return text if len(text) <= most else f"{text[: most // 2]}...{text[-most // 4 :]}"
 

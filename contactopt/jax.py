@@ -20,8 +20,6 @@ which the solver ended. contactopt.sensitivity has the one-sided ones. Where for
 not unique, a warning says so, and derivatives that depend on which they are have the value NaN.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from functools import lru_cache, partial

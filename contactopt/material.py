@@ -1,7 +1,5 @@
 """Isotropic linear elasticity: the two constants of a material."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from contactopt.checks import check_number, check_size

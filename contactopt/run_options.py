@@ -87,9 +87,7 @@ class RunOptions:
 
 
 class Option(NamedTuple):
-    """An option: its annotation, type and usual value, and of its help what stands for the value,
-    and what it is.
-    """
+    """An option: annotation, type and usual value, the word for its value, and what it is."""
 
     annotation: object
     kind: type
@@ -126,9 +124,7 @@ def explained(only: str = "") -> str:
     """The options as lines of a docstring, with `only` added to those of a scene file."""
     return "\n".join(
         textwrap.fill(
-            f"{name} : {one.what}{only if name in IN_FILES else ''}",
-            96,
-            subsequent_indent="    ",
+            f"{name} : {one.what}{only if name in IN_FILES else ''}", 96, subsequent_indent="    "
         )
         for name, one in OPTIONS.items()
     )

@@ -1,7 +1,5 @@
 """What a terminal shows: the answer of a run in tables, and a bar while something long goes on."""
 
-from __future__ import annotations
-
 import re
 import sys
 import threading
@@ -48,9 +46,7 @@ def _style(name: str, text: str) -> str:
 
 
 class Lines:
-    """Progress where there is no terminal: one line for each sentence, and now and then one for
-    work that is counted, of which so many pieces of a total are done.
-    """
+    """Progress without a terminal: a line for each sentence, and sometimes one for counted work."""
 
     def __init__(self, title: str, total: int | None, done: int, quiet: bool = False) -> None:
         self.title, self.total, self.done, self.quiet = title, total, done, quiet
@@ -71,9 +67,7 @@ class Lines:
 
 
 class Bar(Lines):
-    """Progress on a terminal: one line that changes, with the time that it took and, where the work
-    is counted, how long the rest will take.
-    """
+    """Progress on a terminal: one line that changes, with the time and, if known, what is left."""
 
     def __init__(self, title: str, total: int | None, done: int) -> None:
         from rich.console import Console

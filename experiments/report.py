@@ -80,10 +80,11 @@ def write(
 
 def save_figures(name: str, figures: dict[str, Any]) -> None:
     """Write the figures of a report alone: what `python -m experiments.questions.NAME figures` does
-    to draw them again from the tables.
+    to draw them again from the tables, as PDF, too.
     """
     for stem, figure in figures.items():
-        save_figure(figure, REPORTS / name / f"{stem}.png")
+        for ending in ("png", "pdf") if figures_alone() else ("png",):
+            save_figure(figure, REPORTS / name / f"{stem}.{ending}")
 
 
 def figures_alone() -> bool:

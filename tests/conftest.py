@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from skfem import MeshQuad
 from threadpoolctl import threadpool_limits
 
 from contactopt import InterfaceProblem, Material, Part, Plate, Scene, Support, reduce, scenes
@@ -133,13 +132,6 @@ def campaign(tmp_path_factory) -> Path:
             assert main([*command, "--jobs", "2", "-q"]) == 0
             done.touch()
     return folder / "out"
-
-
-@pytest.fixture
-def unit_square() -> MeshQuad:
-    return MeshQuad.init_tensor(np.linspace(0, 1, 4), np.linspace(0, 1, 4)).with_boundaries(
-        {"bottom": lambda x: x[1] == 0, "top": lambda x: x[1] == 1, "left": lambda x: x[0] == 0}
-    )
 
 
 @pytest.fixture

@@ -9,6 +9,10 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1,
 
 TWO = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
 
+_ROUND = [(i, (i + 1) % 4) for i in range(4)]
+# corners of a brick whose middles its next nodes are, as VTK and CalculiX number them
+BRICK_EDGES = [*_ROUND, *((4 + i, 4 + j) for i, j in _ROUND), *((i, i + 4) for i in range(4))]
+
 
 def volume(mesh):
     return skfem.Basis(mesh, mesh.elem(), intorder=6).dx.sum()

@@ -277,15 +277,6 @@ def test_bad_input(changes, words):
         run("punch-2d", **changes)
 
 
-def test_a_scene_without_a_plate_has_no_approach():
-    base = two_blocks("plane-strain")
-    driven = replace(
-        base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1}))
-    )
-    with pytest.raises(InputError, match="no plate, hence no approach"):
-        run(replace(base, upper=driven), accuracy=0.1, quantity="approach")
-
-
 # Against exact solutions
 
 

@@ -9,7 +9,9 @@ import pytest
 
 from contactopt import InputError, solve
 from contactopt.methods import METHODS
+from contactopt.problem import natural_map_residual
 from experiments.questions.atlas import draw
+from experiments.questions.atlas import search as searching
 from experiments.questions.atlas.__main__ import WORDS, failures, report
 from experiments.questions.atlas.frontiers import MULTIPLIERS, crawl_ratio, nearly
 from experiments.questions.atlas.problems import FAILED, Case, run
@@ -22,18 +24,28 @@ from experiments.questions.atlas.radii import (
     pair,
     penalty_error,
 )
-from experiments.questions.atlas.search import CURES, KNOWN, search, smaller
+from experiments.questions.atlas.search import (
+    CURES,
+    KNOWN,
+    continued,
+    definite,
+    rounded,
+    search,
+    smaller,
+)
 
 OURS = {row["method"]: row for row in failures() if " " not in row["method"]}
 FAILING = [name for name, row in OURS.items() if "case" in row]
+# nothing smaller is known for `auto`, which takes some ten seconds on its problem
+ONE_BY_ONE = [pytest.param(n, marks=[pytest.mark.slow] * (n == "auto")) for n in FAILING]
 
 
 def test_every_method_of_ours_is_in_the_atlas():
     assert set(OURS) == set(METHODS) - {"relaxation"} == {n for n in WORDS if " " not in n}
-    assert [name for name in OURS if name not in FAILING] == ["auto"]
+    assert list(OURS) == FAILING
 
 
-@pytest.mark.parametrize("name", FAILING)
+@pytest.mark.parametrize("name", ONE_BY_ONE)
 def test_the_method_still_fails_on_its_smallest_problem_and_the_proof_holds(name):
     """If this fails because the method solves it now: search again, and change the page."""
     case, words = Case.of(OURS[name]["case"]), WORDS[name]
@@ -44,15 +56,17 @@ def test_the_method_still_fails_on_its_smallest_problem_and_the_proof_holds(name
     assert not run(name, cured, **settings).failed
     for i in range(len(case.q) if len(case.q) > 1 else 0):
         assert not run(name, case.without(i)).failed
-    assert len(case.q) <= 3
+    assert len(case.q) <= (5 if name == "auto" else 3)
 
 
 @pytest.mark.parametrize("name", FAILING)
 def test_the_problem_has_a_solution_that_another_method_finds(name):
     case = Case.of(OURS[name]["case"])
-    if name == "lemke":  # it slips 1e12 times as far as forces move it
-        return
-    assert solve(case.problem()).solved
+    problem = case.problem()
+    if name == "auto":  # the solution through which the problem was drawn
+        assert natural_map_residual(problem, case.r) <= 1e-9
+    elif name != "lemke":  # it slips 1e12 times as far as forces move it
+        assert solve(problem).solved
 
 
 @pytest.mark.parametrize(
@@ -98,6 +112,34 @@ def test_the_search_finds_and_shrinks():
     assert sum(found["failed"].values()) > 0 and len(found["case"]["q"]) <= 2
     again = smaller("nsgs", KNOWN["nsgs"])
     assert len(again.q) == 2 and run("nsgs", again).residual > FAILED
+
+
+def test_a_search_goes_on_after_its_last_seed_and_keeps_the_smallest_problem(monkeypatch):
+    small, large = KNOWN["newton"].numbers, KNOWN["nsgs"].numbers
+    monkeypatch.setattr(
+        searching,
+        "search",
+        lambda name, seed, seconds: {
+            "tried": {"none": 2, f"{seed} contacts": 2},
+            "failed": {"none": seed},
+            "case": small if seed == 1 else large,
+        },
+    )
+    row = next(continued("newton", {}))
+    assert row["seeds"] == 1 and row["case"] == large
+    twice = continued("newton", row)
+    assert [next(twice)["seeds"], next(twice)["seeds"]] == [2, 3]
+    assert row["tried"] == {"none": 6, "0 contacts": 2, "1 contacts": 2, "2 contacts": 2}
+    assert row["failed"] == {"none": 3} and row["case"] == small
+
+
+def test_shorter_numbers_do_not_make_a_singular_compliance_indefinite(monkeypatch):
+    flat = np.array([1.0, 7.0**0.5])
+    case = KNOWN["newton"].loaded(Q=np.outer(flat, flat))
+    assert definite(rounded(case, 3)) < -1e-4
+    end = run("newton", KNOWN["newton"])
+    monkeypatch.setattr(searching, "run", lambda *given: end)  # which fails
+    assert definite(smaller("newton", case)) > -1e-14
 
 
 def test_what_is_refused_is_no_failure():

@@ -8,7 +8,7 @@ import pytest
 from test_crosspoints import MATERIAL, box
 from turned import turn_about
 
-from contactopt import Contact, Part, Pressure, Scene, Support, run
+from contactopt import Contact, Material, Part, Pressure, Scene, Support, run
 
 
 def blocks(*each, laws=("tied",), degree=1):
@@ -37,12 +37,21 @@ def blocks(*each, laws=("tied",), degree=1):
 def slanted(scene, A):
     """The scene with every point x at A x, under a pressure of one on all sides, and pinned."""
     parts, pins = [], (Support("x-/y-/z-"), Support("x+/y-/z-", {"y": 0, "z": 0}))
+    pins = (*pins, Support("x-/y+/z-", {"z": 0}))
+    if len(A) == 2:
+        pins = Support("x-/y-"), Support("x+/y-", {"x": 0})
     for part in scene.bodies:
         loads = (*part.loads, *(Pressure(held.boundary, 1.0) for held in part.supports))
         mesh = replace(part.mesh, doflocs=A @ part.mesh.p)
-        held = () if parts else (*pins, Support("x-/y+/z-", {"z": 0}))
+        held = () if parts else pins
         parts.append(replace(part, mesh=mesh, supports=held, loads=loads))
     return replace(scene, bodies=tuple(parts))
+
+
+def stiff(scene):
+    return replace(
+        scene, bodies=tuple(replace(part, material=Material(1e4, 0.3)) for part in scene.bodies)
+    )
 
 
 PLATE = ((0, 0, 0), (2, 2, 0.4), (3, 3, 1), "tri")
@@ -105,6 +114,27 @@ CASES = {
             laws=("coulomb", "tied", "tied"),
         ),
         turn_about((1, 2, 3), 40) @ [[1, 0.3, -0.2], [0, 1, 0.4], [0, 0, 1]],
+    ),
+    "forces that are hardly felt are exchanged": slanted(
+        blocks(
+            ((0, 0), (1, 2 / 3), (1, 5), "tri"),
+            ((0.25, 2 / 3), (1, 1), (4, 4), "quad"),
+            ((0, 2 / 3), (0.25, 5 / 6), (3, 5), "quad"),
+            ((0, 5 / 6), (0.25, 1), (5, 3), "tri"),
+            laws=("coulomb",),
+            degree=2,
+        ),
+        np.array([[1.0, 1.94], [-1.81, 0.32]]),
+    ),
+    "pins that let a body turn easily": slanted(
+        stiff(blocks(((0, 0), (1, 1), (2, 2), "quad"), ((1, 0), (2, 1), (3, 3), "tri"), degree=2)),
+        turn_about((0, 0, 1), 0.5)[:2, :2],
+    ),
+    "a thin body between two others sees all of their contacts": blocks(
+        ((0, 1 / 3, 0), (1, 1, 1 / 3), (2, 2, 1), "quad"),
+        ((0, 0, 0), (1, 2 / 9, 1 / 3), (1, 2, 2), "tri"),
+        ((0, 2 / 9, 0), (1, 1 / 3, 1 / 3), (1, 2, 2), "quad"),
+        degree=2,
     ),
     "ties of one element": blocks(
         ((0, 0), (2, 0.4), (6, 1), "quad"),

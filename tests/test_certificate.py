@@ -131,15 +131,6 @@ def test_hard_problems_with_a_solution_are_never_called_infeasible():
         assert infeasibility(packing(3, 27, seed, mu=1.0)) is None
 
 
-def test_no_contacts_are_solved():
-    assert (
-        natural_map_residual(
-            InterfaceProblem(np.zeros((0, 0)), np.zeros((0, 2)), 0.3), np.zeros((0, 2))
-        )
-        == 0.0
-    )
-
-
 def rigid_table(gaps, mu=0.3, push=(-100.0, 20.0)):
     """A rigid table on three legs in the plane, with gaps below them; no compliance anywhere."""
     places = np.array([-1.0, 0.2, 1.0])

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import skfem
 from mortar_scenes import ring
-from test_corners import bent, box, sides, walled
+from test_corners import box, sides
+from test_tips import bent, walled
 
 from contactopt.meshes.given_curves import Curve
 

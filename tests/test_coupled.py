@@ -128,7 +128,7 @@ def test_products_with_forces_whose_displacements_are_known_begin_there():
     assert np.linalg.norm(Q @ (2 * r) - 2 * full) < 1e-9 * size  # other forces are unknown
 
 
-@pytest.mark.parametrize("tol", [1e-8, 1e-5, 1e-3])
+@pytest.mark.parametrize("tol", [1e-8, 1e-3])
 def test_a_solve_that_stops_in_time_is_what_it_says(tol):
     """By entries of Q; and what is read off it is as accurate as it is."""
     scene = make_scene("cattaneo-3d")

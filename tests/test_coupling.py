@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import turned
-from conftest import MATERIAL, block, two_blocks
+from conftest import MATERIAL, two_blocks
 
 from contactopt import (
     InputError,
@@ -27,7 +27,6 @@ from contactopt.bodies import BODIES
 from contactopt.bodies.protocol import Seen
 from contactopt.bodies.rigid import RigidBody
 from contactopt.coupling import coupling, matching
-from contactopt.coupling.coupling import COUPLINGS, Coupling
 from contactopt.linear.concurrency import each
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.readings.quantities import elastic_energy
@@ -221,21 +220,6 @@ def test_friction_may_be_a_function_of_the_place():
             reduce(replace(scene, mu=wrong))
 
 
-def lifted(scene, pair, upper, lower) -> Coupling:
-    """A kind of coupling that someone adds: matching nodes, one unit of length further apart."""
-    plain = coupling.couple(scene, pair, upper, lower)
-    return replace(plain, gap=plain.gap + 1.0)
-
-
-def test_a_coupling_is_added_by_one_line(monkeypatch):
-    monkeypatch.setitem(COUPLINGS, "lifted", (__name__, "lifted", "one unit further apart"))
-    scene = two_blocks("plane-strain")
-    plain, raised = reduce_bodies(scene), reduce_bodies(scene, coupling="lifted")
-    assert np.allclose(raised.problem.q[:, 0], plain.problem.q[:, 0] + 1.0)
-    with pytest.raises(InputError, match="unknown coupling 'glue'; choose from auto, matching"):
-        reduce_bodies(scene, coupling="glue")
-
-
 @dataclass(frozen=True)
 class Sprung(Rigid):
     """A rigid body on springs that resist its translations, each of stiffness k [force /
@@ -293,16 +277,6 @@ def test_parts_of_no_known_kind_are_refused():
         assemble(two_blocks("plane-strain"), "block", 1, None)
 
 
-def test_an_explicit_operator_costs_no_product(monkeypatch):
-    from contactopt.bodies.elastic import ElasticBody
-
-    def refused(self, force, accuracy=None):
-        raise AssertionError("a product was made")
-
-    monkeypatch.setattr(ElasticBody, "_restricted", refused)
-    assert isinstance(reduce(scenes.flat_punch(2, elements=4), Q="explicit").Q, np.ndarray)
-
-
 def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     from contactopt.linear import operators
 
@@ -322,14 +296,6 @@ def test_a_large_array_is_announced_and_a_huge_one_refused(monkeypatch, caplog):
     # the same limit for sparse rows
     with pytest.raises(InputError, match="would take 800 bytes, more than 799"):
         InterfaceProblem(rows, np.zeros((5, 2)), 0.3).explicit()
-
-
-def test_meshes_keep_their_own_mapping():
-    mesh = block("plane-strain", -2, 0)
-    mapping = mesh.mapping()
-    base = two_blocks("plane-strain")
-    reduce(replace(base, lower=replace(base.lower, mesh=mesh)))
-    assert mesh.mapping() is mapping and "invF" not in vars(mapping)
 
 
 def test_bodies_work_at_the_same_time_where_they_can():

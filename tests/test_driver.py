@@ -1,5 +1,6 @@
 import time
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -261,6 +262,7 @@ def test_the_default_method_gives_the_best_point_that_it_met():
     assert max(row["residual"] for row in found.history[-5:]) > found.residual
 
 
+@cache
 def problems_of_the_clock() -> dict[str, InterfaceProblem]:
     """A problem of each end: solved by Newton's steps, late, without a solution, not decided."""
     rng = np.random.default_rng(2)

@@ -8,7 +8,7 @@ import skfem.io.meshio
 
 from contactopt import InputError, load_mesh
 from contactopt.meshes.mesh_files import load_bodies
-from tests.mesh_samples import SQUARE, TWO, flux, volume, write
+from tests.mesh_samples import BRICK_EDGES, SQUARE, TWO, flux, volume, write
 
 
 def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
@@ -76,21 +76,7 @@ def brick_of_twenty(height, first):
     corners = np.array(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1.0]]
     )
-    edges = [
-        (0, 1),
-        (1, 2),
-        (2, 3),
-        (3, 0),
-        (4, 5),
-        (5, 6),
-        (6, 7),
-        (7, 4),
-        (0, 4),
-        (1, 5),
-        (2, 6),
-        (3, 7),
-    ]
-    places = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in edges]])
+    places = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in BRICK_EDGES]])
     return "\n".join(f"{first + i}, {x}, {y}, {z + height}" for i, (x, y, z) in enumerate(places))
 
 

@@ -4,7 +4,6 @@ import pytest
 from conftest import one_contact
 from matplotlib.figure import Figure
 
-import contactopt
 from contactopt import InputError, InterfaceProblem, models
 from contactopt.methods.backends import CONIC
 from contactopt.methods.backends.conic import Conic
@@ -337,14 +336,3 @@ def test_program_shows_its_mathematics(name, form, problem):
     words = latex.replace(r"\displaystyle", "").replace(r"\text", r"\mathrm")
     figure.text(0, 0, words.replace(r"\top", r"\prime"))
     figure.draw_without_rendering()  # raises where the LaTeX is none
-
-
-def test_laws_stand_in_one_place_beside_the_programs():
-    """Tresca's law and Tresca's program say the same."""
-    bound = np.array([0.3])
-    node = one_contact((0.8, 1.0), 1.0)
-    problem = InterfaceProblem(node.Q, node.q, contactopt.laws.Tresca(bound))
-    program = refined(models.tresca(problem), g=bound)
-    answer = contactopt.solve(problem).reactions.ravel()
-    assert np.allclose(program.variables["r"].value, answer, atol=1e-8, rtol=0)
-    assert abs(answer[1]) == pytest.approx(0.3)

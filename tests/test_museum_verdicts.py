@@ -182,6 +182,7 @@ def test_dragged_plate(said):
     assert set(counts) == {0, 1}
 
 
+@pytest.mark.slow
 @browser_needed
 def test_cobweb(said):
     calm = {}

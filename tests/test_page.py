@@ -32,12 +32,18 @@ def data_of(file):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def cycle(tmp_path_factory):
+    """The folder of three runs, and the load path of the last one."""
     made = tmp_path_factory.mktemp("cycle")
     run(scenes.flat_punch(2, elements=4), made / "flat", figures=(), html=True)
     run(scenes.flat_punch(3, elements=3), made / "solid", figures=(), html=True)
-    run("cattaneo-2d", made / "path", steps=2, elements=8, figures=(), html=True)
-    return made
+    result = run("cattaneo-2d", made / "path", steps=1, elements=8, figures=(), html=True)
+    return made, result.path
+
+
+@pytest.fixture(scope="module")
+def folder(cycle):
+    return cycle[0]
 
 
 def surface_area(points, cells):
@@ -112,8 +118,8 @@ def test_what_touches_is_drawn_touching(tmp_path):
     assert np.abs(gap - s * true[:, 0]).max() < 0.02 * s * np.abs(result.reduction.gap).max()
 
 
-def test_every_state_of_a_path_is_on_the_page(folder):
-    path = run("cattaneo-2d", steps=2, elements=8).path
+def test_every_state_of_a_path_is_on_the_page(cycle):
+    folder, path = cycle
     data = data_of(folder / "path" / "view.html")
     (pair,) = data["contacts"]
     assert data["states"] == len(path.states)
@@ -151,7 +157,7 @@ def test_every_state_of_a_path_is_on_the_page(folder):
 
 def test_bodies_of_long_paths_stay_and_the_page_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr("contactopt.figures.output.MOST_NUMBERS", 1000)
-    run("cattaneo-2d", tmp_path, steps=2, elements=8, figures=(), html=True)
+    run("cattaneo-2d", tmp_path, steps=1, elements=6, figures=(), html=True)
     text, data = (tmp_path / "view.html").read_text(), data_of(tmp_path / "view.html")
     assert not data["moving"] and len(decoded(data["bodies"][0]["move"])) == 1
     assert "The bodies are those of the last state" in text

@@ -1,11 +1,9 @@
 """Every coupling is asked whether a constant pressure gives both sides their consistent forces."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
-import skfem
 import turned
 from mortar_scenes import press_fit
 
@@ -20,7 +18,6 @@ from contactopt import (
     reduce_bodies,
     run,
 )
-from contactopt.coupling import coupling as seam
 from contactopt.coupling.patch_test import misfit
 from contactopt.figures.scene_check import check_scene
 from contactopt.meshes.structured import rename, simplices, tensor_mesh
@@ -149,36 +146,6 @@ def test_matching_that_was_asked_for_fails_with_the_place_and_the_number():
     assert same.conforming and not same.remarks
 
 
-def test_a_contact_on_a_support_sees_the_face_that_it_lies_on():
-    """At an edge of a face the nearest point of integration may lie on the face beside it."""
-    ticks = [0, 0.7023, 1.3808, 2], [0, 0.5752, 1.3402, 2], [1, 1.356, 1.6583, 2]
-    thirds = np.linspace(0, 2, 4)
-    lower = skfem.MeshHex.init_tensor(thirds, thirds, np.linspace(0, 1, 4)).to_meshtet()
-    upper, parts = skfem.MeshHex.init_tensor(*map(np.array, ticks)), []
-    for name, mesh, held, pressed, contact in (
-        ("lower", lower, "xyz", "xy", "z+"),
-        ("upper", upper, "xy", "xyz", "z-"),
-    ):
-        sides = {}
-        for i, axis in enumerate("xyz"):
-            sides[f"{axis}-"] = partial(
-                lambda x, i, low: x[i] < low, i=i, low=mesh.p[i].min() + 1e-9
-            )
-            sides[f"{axis}+"] = partial(
-                lambda x, i, top: x[i] > top, i=i, top=mesh.p[i].max() - 1e-9
-            )
-        supports = tuple(Support(f"{axis}-", {axis: 0.0}) for axis in held)
-        loads = tuple(Pressure(f"{axis}+", 1.0) for axis in pressed)
-        mesh = mesh.with_boundaries(sides)
-        parts.append(Part(name, mesh, MATERIAL, supports, loads, contact=contact))
-    pair = Contact("upper", "lower", 0.0, law="tied")
-    scene = Scene("box", bodies=tuple(parts), contacts=(pair,), kind="solid", degree=2)
-    result = run(scene, figures=())
-    assert np.abs(result.pressure - 1).max() < 1e-8
-    for body in result.fields:
-        assert np.abs(body.stress - [-1, -1, -1, 0, 0, 0]).max() < 1e-7
-
-
 def test_a_search_goes_through_the_same_check():
     result = run(
         cubes(("tetrahedra", "hexahedra"), mu=0.0),
@@ -235,15 +202,6 @@ def test_curved_pairs_that_are_right_are_not_complained_about(sectors, degree, c
     for ratio in ((sectors, sectors + 3), (sectors, 2 * sectors)):
         scene = press_fit(ratio, degree, 0.001, degree == 1, degree == 2)[0]
         assert not reduce_bodies(scene).coupling.remarks
-
-
-def test_every_coupling_is_asked_once(monkeypatch):
-    asked = []
-    kept = seam.misfit
-    monkeypatch.setattr(seam, "misfit", lambda *a: asked.append(a[0].kind) or kept(*a))
-    reduce_bodies(cubes(("mirrored", "tetrahedra")))
-    reduce_bodies(cubes(("tetrahedra", "tetrahedra")))
-    assert asked == ["matching", "mortar", "matching"]
 
 
 @pytest.mark.parametrize("degree", [1, 2])

@@ -284,12 +284,12 @@ def test_files_of_a_path(cycle, tmp_path):
 
 
 def test_run_follows_the_path_of_a_named_scene(tmp_path):
-    result = run("cattaneo-2d", tmp_path, steps=2, elements=8, shear=20.0)
+    result = run("cattaneo-2d", tmp_path, steps=1, elements=8, shear=20.0)
     assert {"history.csv", "path.npz", "path.png", "summary.json"} <= {
         p.name for p in tmp_path.iterdir()
     }
     check_files_of_states(result, tmp_path)
-    assert result.summary["states"] == len(result.path.states) == 11
+    assert result.summary["states"] == len(result.path.states) == 6
     assert result.summary["shear_force"] == pytest.approx(20.0)
     assert result.summary["friction_work"] == result.path.history["friction_work"][-1] > 0
     assert run("punch-2d", elements=4).path is None
@@ -323,12 +323,6 @@ def test_the_loop_is_drawn_over_the_shift_or_the_approach():
     assert plots.loop(cycle).get_xlabel() == "shift [mm]"
     growing = follow(scenes.growing_indentation(elements=8, steps=2))
     assert plots.loop(growing).get_xlabel() == "approach [mm]"
-
-
-def test_energy_balance_with_quadratic_displacement():
-    path = follow([replace(dragged(d), degree=2) for d in (0.0, 1.0, 0.5)])
-    assert path.solved
-    np.testing.assert_allclose(path.history["energy_error"], 0.0, atol=1e-9)
 
 
 def test_a_path_refuses_states_of_other_bodies():

@@ -11,6 +11,7 @@ from contactopt.coupling.back_to_bodies import recover
 from contactopt.figures.pieces import outline
 from contactopt.meshes.cells import elements_of
 from contactopt.meshes.structured import simplices
+from tests.mesh_samples import BRICK_EDGES
 
 
 def solved(scene, **kw):
@@ -79,35 +80,11 @@ EDGES = {
     "triangle6": (3, [(0, 1), (1, 2), (2, 0)]),
     "quad9": (4, [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)]),
     "tetra10": (4, [(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)]),
-    "hexahedron27": (
-        8,
-        [
-            *[
-                (0, 1),
-                (1, 2),
-                (2, 3),
-                (3, 0),
-                (4, 5),
-                (5, 6),
-                (6, 7),
-                (7, 4),
-                (0, 4),
-                (1, 5),
-                (2, 6),
-                (3, 7),
-            ],
-            *[
-                (0, 3, 4, 7),
-                (1, 2, 5, 6),
-                (0, 1, 4, 5),
-                (2, 3, 6, 7),
-                (0, 1, 2, 3),
-                (4, 5, 6, 7),
-                tuple(range(8)),
-            ],
-        ],
-    ),
-}
+    "hexahedron27": (8, [
+        *BRICK_EDGES, (0, 3, 4, 7), (1, 2, 5, 6), (0, 1, 4, 5), (2, 3, 6, 7), (0, 1, 2, 3),
+        (4, 5, 6, 7), tuple(range(8)),
+    ]),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind,cut,name", [

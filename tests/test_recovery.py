@@ -9,7 +9,7 @@ from conftest import MATERIAL
 
 import contactopt
 from contactopt import InputError, Part, Rigid, Scene, Support, scenes
-from contactopt.bodies.element_stress import fields_of, nodal_stress
+from contactopt.bodies.element_stress import nodal_stress
 from contactopt.bodies.fields import Region, von_mises, von_mises_slopes
 from contactopt.bodies.stress_recovery import stress_map
 from contactopt.coupling.reduction import reduce_bodies
@@ -110,14 +110,6 @@ def test_the_load_is_the_transpose_of_the_recovery(kind):
     change = random.standard_normal(stress.shape)
     difference = (von_mises(stress + 1e-6 * change) - von_mises(stress - 1e-6 * change)) / 2e-6
     assert np.allclose(np.sum(von_mises_slopes(stress) * change, axis=1), difference, atol=1e-8)
-
-
-def test_uniform_stress_is_that_of_the_fields():
-    body = assembled(MESHES["triangles"])
-    U = np.zeros(body.basis.N)
-    U[body.unknowns] = np.array([0.1 * body.locations[0], -0.3 * body.locations[1]])
-    found = stress_map(body, Region())
-    assert np.allclose(von_mises(found.stress(U)), fields_of(body, U).von_mises[found.sources])
 
 
 @pytest.mark.parametrize(

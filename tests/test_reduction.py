@@ -19,34 +19,6 @@ from contactopt import (
 )
 from contactopt.coupling.back_to_bodies import recover
 
-KINDS = ["plane-strain", "axisymmetric", "solid"]
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_compliance_is_the_trailing_block_of_the_inverse(kind):
-    for body in reduce_bodies(two_blocks(kind)).bodies:
-        free = body.body.free
-        inverse = np.linalg.inv(body.body.A[free][:, free].toarray())
-        place = np.searchsorted(free, body.interface)
-        expected = inverse[np.ix_(place, place)]
-        assert (
-            np.abs(body.solver.trailing_inverse() - expected).max() < 1e-12 * np.abs(expected).max()
-        )
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        *map(two_blocks, KINDS),
-        scenes.flat_punch(3, elements=3),
-        scenes.sphere(elements=6, rigid="sphere"),
-    ],
-)
-def test_products_by_body_solves_are_those_of_the_explicit_operator(scene):
-    reduction = reduce_bodies(scene)
-    Q = reduction.problem.Q
-    assert np.abs(reduction.operator @ np.eye(len(Q)) - Q).max() < 1e-11 * np.abs(Q).max()
-
 
 @pytest.mark.parametrize(
     "scene",
@@ -139,12 +111,6 @@ def test_interface_nodes_that_do_not_match_are_refused(cells, shift, message):
     )
     with pytest.raises(InputError, match=f"interface nodes do not match.*{message}.*same nodes"):
         reduce_bodies(replace(base, lower=replace(base.lower, mesh=moved)), coupling="matching")
-
-
-def test_rigid_gap_must_be_finite():
-    base = two_blocks("plane-strain")
-    with pytest.raises(InputError, match="not finite"):
-        reduce(replace(base, lower=Rigid("wall", gap=lambda x: np.full(x.shape[1], np.nan))))
 
 
 def test_two_rigid_bodies_are_refused():

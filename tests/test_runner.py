@@ -6,7 +6,6 @@ import pytest
 from conftest import two_blocks
 from skfem import MeshTri
 
-import contactopt
 from contactopt import InputError, Material, Part, Plate, Rigid, Scene, cli, run
 from contactopt.readings.quantities import value_of
 
@@ -92,13 +91,13 @@ def test_run_writes_everything(name, tmp_path):
     }
     check_tables(result, out)
     summary = json.loads((out / "summary.json").read_text())
-    assert list(summary) == KEYS
+    assert list(summary) == KEYS and summary == result.summary
     assert summary["status"] == "solved" and summary["residual"] <= 1e-8
     assert summary["normal_force"] == pytest.approx(100, rel=1e-8)
     assert 0 < summary["stick_half_width"] <= summary["contact_half_width"]
-    assert summary["seconds"]["total"] >= max(
-        v for k, v in summary["seconds"].items() if k != "total"
-    )
+    seconds = summary["seconds"]
+    assert {"solve", "recover", "figures", "files", "total"} <= set(seconds)
+    assert seconds["total"] == max(seconds.values())
     data = np.load(out / "interface.npz")
     k = summary["contact_nodes"]
     shape = (k, 2) if name == "punch-3d" else (k,)
@@ -120,61 +119,6 @@ def test_run_takes_a_users_scene(tmp_path):
     result = run(two_blocks("solid", mu=0.2), tmp_path, mu=0.1)
     assert result.summary["mu"] == 0.1 and result.summary["status"] == "solved"
     assert result.summary["approach"] > 0
-
-
-def test_a_body_without_plate_has_no_approach():
-    from dataclasses import replace
-
-    from contactopt import Support
-
-    base = two_blocks("plane-strain")
-    driven = replace(
-        base.upper, loads=(), supports=(*base.upper.supports, Support("top", {"y": -0.1}))
-    )
-    assert run(replace(base, upper=driven)).summary["approach"] is None
-
-
-def test_docstring_names_exist():
-    for name in contactopt.__all__:
-        assert getattr(contactopt, name) is not None
-    assert callable(contactopt.solve) and callable(contactopt.run) and callable(contactopt.reduce)
-    with pytest.raises(AttributeError):
-        contactopt.nothing  # noqa: B018
-
-
-def test_command_line_runs(tmp_path, capsys):
-    assert (
-        cli.main(
-            [
-                "run",
-                "punch-2d",
-                "--out",
-                str(tmp_path),
-                "--elements",
-                "4",
-                "--mu",
-                "0.2",
-                "--tol",
-                "1e-7",
-            ]
-        )
-        == 0
-    )
-    text = capsys.readouterr()
-    assert "solved" in text.out and "approach" in text.out and "reducing" in text.err
-    assert json.loads((tmp_path / "summary.json").read_text())["mu"] == 0.2
-
-
-def test_command_line_reports_what_is_not_solved(tmp_path, capsys):
-    assert (
-        cli.main(["run", "punch-2d", "--out", str(tmp_path), "--elements", "4", "--tol", "1e-30"])
-        == 1
-    )
-    assert json.loads((tmp_path / "summary.json").read_text())["status"] in (
-        "stalled",
-        "cycling",
-        "iteration_limit",
-    )
 
 
 def test_list(capsys):
@@ -270,12 +214,6 @@ def test_the_history_of_a_path_holds_the_quantities_that_accuracy_bounds():
     a, c = path.history["contact_half_width"][-1], path.history["stick_half_width"][-1]
     assert value_of("width", path.reduction, path.solution) == pytest.approx(a, rel=1e-10)
     assert value_of("stick", path.reduction, path.solution) == pytest.approx(c / a, rel=1e-10)
-
-
-def test_the_summary_on_disk_is_that_of_the_result(tmp_path):
-    result = run("punch-2d", tmp_path, elements=4)
-    assert json.loads((tmp_path / "summary.json").read_text()) == result.summary
-    assert {"solve", "recover", "figures", "files", "total"} <= set(result.summary["seconds"])
 
 
 def test_a_contact_that_the_mesh_cannot_show_is_remarked_on():

@@ -135,9 +135,10 @@ def test_a_browser_draws_it(tmp_path, width):
                 "(() => { const c = document.getElementById('view'); const d ="
                 " c.getContext('2d').getImageData(0, 0, c.width, c.height).data; const seen = new"
                 " Set(); for (let i = 0; i < d.length; i += 4) seen.add(d[i] << 16 | d[i + 1] << 8"
-                " | d[i + 2]); return seen.size; })()"
+                " | d[i + 2]); return [seen.size, seen.has(0xE69F00), seen.has(0xD55E00)]; })()"
             )
-            assert drawn > 8 and not browser.faults
+            assert drawn[0] > 8 and not browser.faults
+            assert drawn[1:] == [True, False], "the legend has contacts, and no bolt"
 
 
 def test_the_command(tmp_path, capsys, monkeypatch):

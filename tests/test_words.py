@@ -1,13 +1,17 @@
 """What objects say of themselves, and what is said about input that cannot be used."""
 
+import ast
 import html.parser
 import logging
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import two_blocks
 
+import contactopt
 from contactopt import (
     InputError,
     Plate,
@@ -74,6 +78,46 @@ def test_the_grammar_of_a_diagnosis_agrees_with_its_numbers():
         np.eye(4), -np.ones((2, 2)), 0.5, V=np.array([[0.0], [1.0], [0.0], [1.0]]), s=[0.0]
     )
     assert "convergence is not guaranteed" in str(diagnose(tilted))
+
+
+# values that are no number, never one, or one of many, beside what `count` says elsewhere
+MANY = {
+    "MOST_CONTACTS",
+    "MOST_LEVELS",
+    "MOST_ITERATIONS",
+    "FEW",
+    "most",
+    "cells",
+    "loose",
+    "law",
+    "scene.copies",
+}
+MANY |= {"scene.dim", "', '.join(map(str, SIZES[dim]))", "len(contacts)", "len(states)", "number"}
+MANY |= {"len(names)", "len(self.couplings)", "axes", "width"}  # said where there are several
+ALWAYS = {"unknown", "node", "name"}  # names is a verb, too
+
+
+def test_numbers_and_their_words_agree():
+    """What `count` says somewhere is not written as a number and a plural elsewhere."""
+    files = Path(contactopt.__file__).parent.rglob("*.py")
+    trees = {file: list(ast.walk(ast.parse(file.read_text()))) for file in files}
+    things = set()
+    for node in (node for nodes in trees.values() for node in nodes):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("count", "said"):
+            texts = [one.value for one in node.args[1:] if isinstance(one, ast.Constant)]
+            things |= {str(texts[0]).split()[-1 if len(texts) == 1 else 0]} if texts else set()
+    assert {"contact", "state", "place"} <= things
+    plural = {f"{thing}s" for thing in things - ALWAYS} | {"bodies", "boundaries", "meshes"}
+    words = re.compile(r" (?:more |other |free |named )?(" + "|".join(plural) + r")\b")
+    found = [
+        f"{file.name}: {ast.unparse(value.value)}{after.value[:30]}"
+        for file, nodes in trees.items()
+        for text in (node for node in nodes if isinstance(node, ast.JoinedStr))
+        for value, after in zip(text.values, text.values[1:])
+        if isinstance(value, ast.FormattedValue) and ast.unparse(value.value) not in MANY
+        if isinstance(after, ast.Constant) and words.match(str(after.value))
+    ]
+    assert not found
 
 
 def test_a_path_says_how_many_states_there_are():

@@ -23,7 +23,7 @@ from contactopt import (
 )
 from contactopt.cli import main
 from contactopt.meshes.structured import rename, tensor_mesh
-from contactopt.scenes import cattaneo, flat_punch
+from contactopt.scenes import flat_punch
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
 
@@ -272,13 +272,6 @@ def test_what_is_no_problem_or_scene(function, given):
 def test_a_list_of_scenes_is_a_path():
     with pytest.raises(InputError, match=r"got list. contactopt.follow solves"):
         run([flat_punch(2, elements=4)])
-
-
-def test_a_path_of_other_meshes_is_refused():
-    with pytest.raises(InputError):
-        follow([flat_punch(2, elements=4), flat_punch(2, elements=4, width=7.0)])
-    with pytest.raises(InputError):
-        follow([cattaneo(2, elements=4), cattaneo(2, elements=4, size=200.0)])
 
 
 # Loads that no contact can balance

@@ -52,6 +52,9 @@ What the last two refinements changed of it is therefore added to the sum, which
 safety of 1.25, unless the reading is more uncertain than that (indicators.misfit). So the estimate
 is not a bound. A guaranteed bound is made at the end where it is asked for (contactopt.bounds).
 
+The adjoint of one state says nothing about the states before it. So the error of a load path is
+read from the changes of its value, which fall like the square of the error in the energy norm.
+
 Sources: Becker, Rannacher (2001), An optimal control approach to a posteriori error estimation in
 finite element methods, Acta Numerica 10; Doerfler (1996), A convergent adaptive algorithm for
 Poisson's equation, for the marking; Zienkiewicz, Zhu (1987) and (1992) for the recovery.

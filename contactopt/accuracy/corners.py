@@ -13,8 +13,6 @@ Source: Williams (1952), Stress singularities resulting from various boundary co
 corners of plates in extension.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

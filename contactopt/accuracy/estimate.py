@@ -1,7 +1,5 @@
 """What a search for an accuracy knows: one Level for every mesh, and one Estimate at the end."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from contactopt.bounds.guarantee import Guarantee

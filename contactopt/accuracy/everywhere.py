@@ -28,8 +28,6 @@ procedure for the estimation of the numerical uncertainty of CFD calculations ba
 refinement studies, for the four meshes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ any estimate of an error means anything. Hertz's theory tells where the contact 
 (contactopt.readings.hertz_size), and elements there are divided before anything is solved.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial

@@ -82,10 +82,7 @@ def misfit(found: Sequence[ElementErrors]) -> float:
 
 
 def element_errors(
-    solved: Solved,
-    quantity: Quantity | None,
-    value: float,
-    volumes: Sequence[np.ndarray] = (),
+    solved: Solved, quantity: Quantity | None, value: float, volumes: Sequence[np.ndarray] = ()
 ) -> ElementErrors:
     """What each element adds to the error of a quantity with this value, as in contactopt.accuracy.
 
@@ -177,10 +174,7 @@ def read_once(solved: Solved, name: str) -> dict[str, Any]:
 def along_path(
     solved: Solved, quantity: Quantity, value: float, volumes: Sequence[np.ndarray] = ()
 ) -> ElementErrors:
-    """As element_errors, for a load path as well. Friction remembers the slip of earlier states,
-    and no adjoint goes back over them: elements are marked by the largest energy of the error of
-    all states.
-    """
+    """As element_errors; for a load path by the largest energy of the error of all states."""
     if solved.path is None:
         return element_errors(solved, quantity, value, volumes)
     count = len(solved.path.states)
@@ -198,9 +192,7 @@ def _state(solved: Solved, number: int) -> Solved:
 
 
 def between_contacts(solved: Solved, weights: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What elements (elements,) at the contact add to the error of a function of the forces with
-    the derivatives `weights` (k,), because the pressure varies between contacts.
-    """
+    """What elements at the contact add to the error because pressure varies between contacts."""
     reduction, problem = solved.reduction, solved.reduction.problem
     added = weights * problem.areas * pressure_errors(reduction, solved.solution.reactions[:, 0])
     shares = spread(reduction, np.pad(added[:, None], ((0, 0), (0, problem.dim - 1))))

@@ -1,8 +1,4 @@
-"""Meshes that are given, or made once, and then divided: where the quantity needs it, or
-everywhere.
-"""
-
-from __future__ import annotations
+"""Meshes that are given, or made once, and then divided, everywhere or where it is needed."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -35,7 +31,22 @@ from contactopt.solving.solve_scene import Options, Solved, solve_scene
 # and 1
 SHARE = 0.6
 LESS = 0.25  # by how much the change of a path falls at most from one mesh to the next
+SLOWEST = 0.9  # ratio of the errors of two meshes; above, a refinement tells nothing of the next
 USUAL = 2_000_000  # unknowns of the largest mesh, unless another bound is given
+
+
+def remaining(changes: np.ndarray, ratio: float) -> float:
+    """The error of a load path after the last one or two `changes` of its value, in their order.
+
+    The error of a quantity falls as the square of that in the energy norm, whose `ratio` of the
+    last two meshes this is, held below SLOWEST: what remains is a geometric series. The change
+    itself falls at most by LESS. Changes of both signs scatter: then the larger one counts.
+    """
+    last, before = abs(changes[-1]), abs(changes[-2]) if len(changes) > 1 else 0.0
+    scatters = len(changes) > 1 and changes[0] * changes[1] < 0
+    least = SAFETY[3] * max(last, before * (1.0 if scatters else LESS))
+    held = min(ratio, SLOWEST)
+    return float(max(least, last * held / (1 - held)))
 
 
 class Locally:
@@ -95,7 +106,9 @@ class Locally:
         if not len(changes):
             size = np.inf
         elif solved.path is not None:  # nothing but the changes tells the error of a whole path
-            size = SAFETY[3] * float(np.max(changes * (1.0, LESS)[: len(changes)]))
+            before = self.errors[-2].energy
+            ratio = (last.energy / before) ** 2 if before > 0 else SLOWEST
+            size = remaining(np.diff(self.values[-3:]), ratio)
         else:  # no adjoint: what a refinement changed, twice
             size = 2 * float(np.max(changes))
         mesh = np.nan if solved.path is not None else -last.total
@@ -117,9 +130,7 @@ class Locally:
     def advance(
         self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
     ) -> float:
-        """Divide elements, around contacts where the mesh is too coarse to know and around local
-        maxima that may be the largest, too; returns how many unknowns the next mesh has.
-        """
+        """Divide elements, also at unresolved contacts and rival maxima; returns the unknowns."""
         marked = None
         if not self.whole:
             assert self.last is not None

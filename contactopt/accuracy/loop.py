@@ -1,7 +1,5 @@
 """Solve, estimate, refine: the one loop that bounds the error of a quantity."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Sequence
@@ -34,8 +32,6 @@ MOST_LEVELS = 60
 WATCHED = 1.5
 SAME_PEAK = 8.0  # elements by which a peak moves at most from one mesh to the next
 UNWATCHED = 0.5  # of its value that a peak may be larger where no smaller elements have shown it
-TENTH = 0.1  # of the accuracy may be the solver's (experiments.questions.bounds)
-ROUNDING = 1e-15  # least relative error: no reading is exact
 
 
 def refine(
@@ -75,12 +71,10 @@ def refine(
 
 
 def _in_time(options: Options, accuracy: float) -> Options:
-    """Options with which solvers stop at a tenth of the accuracy, small enough for derivatives,
-    unless another tolerance is asked for.
-    """
+    """Options with which solvers stop at a tenth of the accuracy, unless a tolerance is given."""
     if options.tol != TOL:
         return options
-    return replace(options, tol=max(TOL, min(CERTIFIED, TENTH * accuracy)))
+    return replace(options, tol=max(TOL, min(CERTIFIED, 0.1 * accuracy)))  # a tenth is the solver's
 
 
 @dataclass(eq=False)
@@ -140,7 +134,7 @@ class _Loop:
         self.unresolved = self._unresolved()
         size = max(judged.size, reading.uncertainty, excess)
         scale = abs(reading.value) or 1.0
-        error = max(size / scale, solution.residual, ROUNDING)
+        error = max(size / scale, solution.residual, 1e-15)  # the least: no reading is exact
         top = reading.peaks[0] if reading.peaks and reading.peaks[0].size else None
         self.levels.append(
             Level(
@@ -200,9 +194,7 @@ class _Loop:
         return found, excess
 
     def _before(self, peak: Peak) -> tuple[float, float]:
-        """The value of a peak, and the largest value, on the last mesh of larger elements there;
-        else a share of its value. (What nodes scatter about a fit is large on every mesh.)
-        """
+        """The value of a peak, and the largest one, on the last mesh of larger elements there."""
         for earlier in reversed(self.peaks[:-1]):
             away = [float(np.linalg.norm(one.place - peak.place)) for one in earlier]
             larger = [

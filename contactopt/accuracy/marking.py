@@ -1,7 +1,5 @@
 """Which elements are divided, and the meshes that come of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,8 +21,6 @@ from contactopt.scenes.body_kinds import Body
 from contactopt.scenes.refined_scenes import part_curves
 from contactopt.scenes.scene import Part, Scene
 
-FIRST = 4  # elements across the contact half-width of a first mesh that the scene itself makes
-RATIO = 1.6  # by how much longer facets may be than those of the other body that face them
 SAMPLES = {2: 32, 3: 8}  # parts of a facet's edge at whose ends a gap function is sampled
 CLOSURE = 0.05  # share of the closure by which a sampled gap may fall below the one between nodes
 
@@ -68,7 +64,7 @@ def divisible(scene: Scene, simplicial: bool) -> tuple[Scene, Shapes]:
     def prepared(part: Body) -> Body:
         if not isinstance(part, Part):
             return part
-        given = part.build_mesh(FIRST, scene.zone)
+        given = part.build_mesh(4, scene.zone)  # elements across its first half-width
         cut = simplices(given) if simplicial else straight(given)
         found = curves[part.name] = part_curves(part, given)
         guessed[part.name] = {
@@ -115,9 +111,7 @@ def otherwise(scene: Scene, shapes: Shapes) -> Scene:
 
 
 def finer(scene: Scene, marked: tuple[np.ndarray, ...] | None, shapes: Shapes) -> Scene:
-    """The scene with the marked elements of every body divided (None: all), and facets that face
-    much finer ones with them (`balanced`), until none is left.
-    """
+    """The scene with marked elements (None: all) divided, and facets that face much finer ones."""
     if marked is None:
         return _with_meshes(scene, lambda part: split(part.mesh, shapes.of(part)))
     for _ in range(6):  # of divisions that keep facing facets about as long as each other
@@ -152,9 +146,7 @@ def unknowns(scene: Scene) -> int:
 
 
 def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:
-    """Mark more elements so that surfaces that face each other stay about as fine: a much finer one
-    sees the other as a polygon, whose corners press ever harder.
-    """
+    """Mark more elements, so that surfaces that face each other stay about as fine."""
     chosen = [set(elements.tolist()) for elements in marked]
     names = [part.name for part in scene.parts]
     for pair in scene.pairs:
@@ -173,7 +165,7 @@ def balanced(scene: Scene, marked: tuple[np.ndarray, ...]) -> tuple[np.ndarray, 
             least = halved[near].copy()
             reached = back <= 2 * size[mine]
             np.minimum.at(least, mine[reached], halved[reached])
-            coarse = (size > RATIO * least) & (distance <= 2 * size)
+            coarse = (size > 1.6 * least) & (distance <= 2 * size)
             chosen[sides[one]].update(element[coarse].tolist())
     return tuple(np.array(sorted(elements), dtype=int) for elements in chosen)
 

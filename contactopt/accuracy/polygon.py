@@ -12,8 +12,6 @@ The quantity is read once more from the other shape, in which every edge has the
 of its two ends. What it changes is the error of the geometry, which no refinement removes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

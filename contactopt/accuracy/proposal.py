@@ -2,15 +2,20 @@
 
 The error of a quantity on n elements across the half-width of contact, which grow away from it, is
 about CONSTANTS / n^2 at most. The constants are those of eight scenes with known answers, and the
-rule was judged by twenty others: `python -m experiments.questions.front` measures both.
-"""
+rule was judged by others: `python -m experiments.questions.front` measures both.
 
-from __future__ import annotations
+A profile x^m presses hardest at about a / (2 (m - 1)) from the edge of a contact of half-width a.
+This is the length that the points have to resolve, so that the error of the pressure grows with
+(m - 1)^2, relative to a parabola. The approach is an average and grows with m. Below a profile with
+m < 2 the pressure has a cusp or is infinite, and a width next to a steep edge cannot be fitted:
+there is no rule for these.
+"""
 
 from dataclasses import dataclass
 from math import ceil, sqrt
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.coupling.posed import Posed
@@ -20,24 +25,36 @@ from contactopt.scenes.scene import HalfSpace, Part, Scene
 # what the edge of contact is: it ends by itself, at a corner of a body, or nowhere;
 # degree of the displacement, 0 for a half-space without a mesh -> quantity -> error times n^2
 CONSTANTS: dict[tuple[str, int], dict[str, float]] = {
-    ("free", 0): {"pressure": 0.1, "width": 0.4, "approach": 0.07, "stick": 0.8},
-    ("free", 1): {"pressure": 0.4, "width": 0.8, "approach": 2.0, "stick": 0.8},
+    ("free", 0): {"pressure": 0.1, "width": 0.4, "approach": 0.07, "stick": 2.2},
+    ("free", 1): {"pressure": 0.4, "width": 0.8, "approach": 2.0, "stick": 2.1},
     ("free", 2): {"pressure": 0.05, "width": 0.35, "approach": 0.3, "stick": 0.8},
-    ("corner", 0): {"approach": 0.7, "stick": 0.8},
+    ("corner", 0): {"stick": 2.4},
     ("corner", 1): {"approach": 1.7, "stick": 6.6},
     ("corner", 2): {"approach": 0.15, "stick": 1.9},
     ("none", 1): {"pressure": 0.8},
     ("none", 2): {"pressure": 0.1},
 }
-# degree -> elements below which a mesh is hardly cheaper, and seconds of a solution on one core:
-# the first without regard to the mesh, the second times n^2
-FEWEST = {0: 16, 1: 8, 2: 4}
-SECONDS = {0: (0.015, 4e-5), 1: (0.06, 3e-4), 2: (0.06, 1.4e-3)}
+# around a contact in three dimensions many points say where the stick zone ends, and their errors
+# cancel
+AROUND = {"stick": 0.3}
+# error of the approach of a disc times n: the evenly spaced points fill another area than the disc
+DISC = 0.12
+# seconds of a solution on one core: the first without regard to the mesh, the second times n^2;
+# of a half-space by (three dimensions?, friction?), of a mesh in two dimensions by its degree
+POINTS = {
+    (False, False): (0.012, 1e-5),
+    (False, True): (0.027, 2.5e-5),
+    (True, False): (0.022, 6e-5),
+    (True, True): (0.045, 3e-4),
+}
+MESHES = {1: (0.06, 3e-4), 2: (0.07, 1.4e-3)}
+FREE = 1 / 3  # by this share of the first seconds a mesh may be finer than an accuracy asks for
 # error of a half-space for a body of some half-widths of contact: of the approach it falls with
 # this size, of the rest with its square
 BODY, SETTLING = 0.4, 0.6
 SAFETY = 1.5  # on the constants, for scenes of other shapes and materials
-SHARE = 0.01  # of the accuracy, which the tolerance of the solver may take
+POWERS = (1.8, 6.5)  # exponents of a profile, between which the pressure and width are known
+PARABOLA = 2.2  # exponent up to which a width can be fitted
 
 
 @dataclass(frozen=True)
@@ -52,24 +69,61 @@ class Proposal:
     seconds: float
 
 
-def propose(
-    quantity: str, accuracy: float, edge: str, size: float, degrees: tuple[int, ...] = (0, 1, 2)
-) -> Proposal | None:
-    """The cheapest mesh for a relative accuracy; None where the quantity has no rule.
+@dataclass(frozen=True)
+class ContactFacts:
+    """What the rule knows of a contact.
 
-    edge     'free', 'corner' or 'none', as above
-    size     of the smaller body over the half-width of contact
-    degrees  that are open
+    edge      'free', 'corner' or 'none', as above
+    size      of the smaller body over the half-width of contact
+    power     m of the profile x^m, where the edge is free
+    solid     whether the scene has three dimensions
+    friction  whether there is friction
+    """
+
+    edge: str
+    size: float = np.inf
+    power: float = 2.0
+    solid: bool = False
+    friction: bool = False
+
+    def elements(self, quantity: str, degree: int, accuracy: float) -> int | None:
+        """How many an accuracy needs; None where there is no rule."""
+        if (self.edge, degree, quantity) == ("corner", 0, "approach"):
+            return ceil(SAFETY * DISC / accuracy)
+        own = CONSTANTS.get((self.edge, degree), {}).get(quantity)
+        if own is None:
+            return None
+        if self.edge == "free":
+            own = AROUND.get(quantity, own) if self.solid and degree == 0 else own
+            if quantity == "approach":
+                own *= max(1.0, self.power / 2)
+            elif POWERS[0] <= self.power <= (POWERS[1] if quantity == "pressure" else PARABOLA):
+                own *= max(1.0, self.power - 1) ** 2
+            else:
+                return None
+        return ceil(sqrt(SAFETY * own / accuracy))
+
+    def seconds(self, degree: int) -> tuple[float, float]:
+        """The two numbers of the cost."""
+        return MESHES[degree] if degree else POINTS[self.solid, self.friction]
+
+
+def propose(
+    quantity: str, accuracy: float, contact: ContactFacts, degrees: tuple[int, ...] = (0, 1, 2)
+) -> Proposal | None:
+    """The cheapest mesh for a relative accuracy, of the degrees that are open; None where the
+    quantity has no rule.
     """
     found = []
     for degree in degrees:
-        constant = CONSTANTS.get((edge, degree), {}).get(quantity)
-        if constant is None or (degree == 0 and not half_space_fits(quantity, accuracy, size)):
+        needed = contact.elements(quantity, degree, accuracy)
+        fits = degree > 0 or half_space_fits(quantity, accuracy, contact.size)
+        if needed is None or not fits:
             continue
-        elements = max(FEWEST[degree], ceil(sqrt(SAFETY * constant / accuracy)))
-        first, growing = SECONDS[degree]
+        first, growing = contact.seconds(degree)
+        elements = max(int(sqrt(FREE * first / growing)), needed)
         seconds = first + growing * elements**2
-        found.append(Proposal(degree, elements, SHARE * accuracy, seconds))
+        found.append(Proposal(degree, elements, 0.01 * accuracy, seconds))  # for the solver
     return min(found, key=lambda own: own.seconds, default=None)
 
 
@@ -95,7 +149,9 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
     size = min(sizes, default=np.inf)
     flat = all(part.curve is None for part in scene.parts if isinstance(part, Part))
     meshes = (1, 2) if scene.dim == 2 else ()
-    found = propose(quantity, accuracy, edge, size, (0, *meshes) if flat else meshes)
+    power = power_of(own.positions, own.gap, width) if edge == "free" else 2.0
+    contact = ContactFacts(edge, size, power, scene.dim == 3, _rubs(scene))
+    found = propose(quantity, accuracy, contact, (0, *meshes) if flat else meshes)
     if found is None:
         return []
     what = "stick width" if quantity == "stick" else "largest pressure"
@@ -127,3 +183,30 @@ def edge_of(scene: Scene, made: Posed) -> str:
         if turned < CLOSE or (scene.kind == "axisymmetric" and abs(normals[0, 0]) > 0.5)
         else "corner"
     )
+
+
+def power_of(positions: np.ndarray, gap: np.ndarray, width: float) -> float:
+    """The exponent m of a gap that grows like |x|^m from its least value, on positions (dim, k).
+
+    It is the median over the places x beyond half of the width, each compared with the node next to
+    x / 2; nan where the middle half of them spreads by more than one, as on a rough surface.
+    """
+    low = int(gap.argmin())
+    x, rise = (positions - positions[:, [low]]).T, gap - gap[low]
+    far = np.linalg.norm(x, axis=1)
+    outer = np.flatnonzero((far > width / 2) & (far <= 1.01 * width))
+    inner = cKDTree(x).query(x[outer] / 2)[1]
+    outer, inner = (
+        own[(rise[inner] > 0) & (rise[outer] > 0) & (inner != low)] for own in (outer, inner)
+    )
+    if not len(outer):
+        return float("nan")
+    powers = np.log(rise[outer] / rise[inner]) / np.log(far[outer] / far[inner])
+    first, middle, last = np.quantile(powers, (0.25, 0.5, 0.75))
+    return float(middle) if last - first < 1 else float("nan")
+
+
+def _rubs(scene: Scene) -> bool:
+    """Whether there is friction."""
+    mu = scene.pairs[0].mu
+    return callable(mu) or bool(np.any(np.asarray(mu, dtype=float) > 0))

@@ -1,7 +1,5 @@
 """Round bodies that fit into each other: a pin in a hole with clearance, and the press fit."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.analytic.reference import Reference

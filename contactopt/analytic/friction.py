@@ -1,8 +1,4 @@
-"""Coulomb friction under growing normal load between dissimilar materials: rigid flat punches and
-Hertz's geometry.
-"""
-
-from __future__ import annotations
+"""Coulomb friction under growing load between dissimilar materials: flat punches and Hertz."""
 
 from collections.abc import Callable
 from dataclasses import replace

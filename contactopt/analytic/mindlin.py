@@ -11,8 +11,6 @@ Lincei 27; Mindlin (1949), J. Appl. Mech. 16, 259-268; Mindlin and Deresiewicz (
 Mech. 20, 327-344; Johnson (1985), Contact Mechanics, sections 7.2(d), 7.4(a).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise

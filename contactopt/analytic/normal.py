@@ -1,7 +1,5 @@
 """Closed forms under normal load: Hertz, and the rigid flat punch without friction and bonded."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.analytic.reference import Field, Reference, check_beta, ellipse

@@ -7,8 +7,6 @@ polynomials, on panels that shrink towards the stick limit v = b where the tract
 singular integrals of the polynomials are exact.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,8 +20,6 @@ SMALLEST = 1e-5  # panel, relative to min(b, 1)
 LARGEST_PANEL = 1.5  # panel; the kernels have poles at a distance of pi from the real line
 TAIL = 16.0  # the grid ends at b + TAIL: with what lies beyond, e^-TAIL is lost
 NEAR = 2.0  # half-lengths from a panel's centre up to which a singular kernel needs the exact rule
-# half-lengths from which a rule of 40 nodes is exact, while the recurrence for Q_m loses digits
-AWAY = 1.2
 
 NODES, WEIGHTS = legendre.leggauss(ORDER)
 # values -> P_m
@@ -236,7 +232,7 @@ def _log_moments(x: np.ndarray) -> np.ndarray:
 
 
 def _away(x: np.ndarray) -> np.ndarray:
-    return np.abs(x[:, None]) > AWAY
+    return np.abs(x[:, None]) > 1.2  # half-lengths, where a rule of 40 nodes is exact
 
 
 def _by_quadrature(x: np.ndarray, log: bool) -> np.ndarray:

@@ -1,8 +1,4 @@
-"""What exact solutions have in common: the record of one, the elastic constants of a pair of
-bodies.
-"""
-
-from __future__ import annotations
+"""What exact solutions share: the record of one, and the elastic constants of two bodies."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

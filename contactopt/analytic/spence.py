@@ -17,8 +17,6 @@ eigenvalue problem for elastic contact with finite friction, Proc. Camb. Phil. S
 Spence (1975), J. Elasticity 5, 297-319. Half-space: Johnson (1985), eq (2.25), (3.18).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -187,9 +185,7 @@ def _excess(punch: UnitPunch, mu: float) -> float:
 
 
 def _uncoupled(mu: float, beta: float, axisymmetric: bool) -> float:
-    """ln artanh(c/a) without beta q: K'(k)/K(k) = beta/mu in plane strain, b / tanh b = (mu/beta)
-    K'(k) on a circle.
-    """
+    """ln artanh(c/a) without beta q: K'(k)/K(k) or, on a circle, b / tanh b from beta and mu."""
 
     from scipy.optimize import brentq
     from scipy.special import ellipkm1

@@ -1,7 +1,5 @@
 """A campaign: the unfinished runs of an experiment, executed and stored one by one."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections import Counter
@@ -16,15 +14,7 @@ from contactopt.benchmark.measure import Task, absent_row, calibration
 from contactopt.benchmark.pool import History, run_locally
 from contactopt.benchmark.report_page import report_campaign
 from contactopt.benchmark.reports import build, layouts, publish
-from contactopt.benchmark.store import (
-    ANSWERS,
-    Store,
-    lines,
-    load,
-    require,
-    save,
-    save_answers,
-)
+from contactopt.benchmark.store import ANSWERS, Store, lines, load, require, save, save_answers
 from contactopt.checks import check_count
 from contactopt.errors import InputError
 from contactopt.files.writing import remove_files, whole_file

@@ -1,7 +1,5 @@
 """Runs made on many machines: by the workers of a Dask scheduler, or in shards of a campaign."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Generator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Tables of an experiment file or of a test set, whose lists and ranges are multiplied out."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The keys of an experiment file and the columns of results; the texts are in keys.toml."""
 
-from __future__ import annotations
-
 import tomllib
 from importlib.resources import files
 

@@ -3,8 +3,6 @@
 Runs in the campaign's process, where no plug-in is loaded.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -9,8 +9,6 @@ Q in rows of blocks (dim, dim), namely `indptr`, `indices` and `data`, `q` (k, d
 `solve` is timed.
 """
 
-from __future__ import annotations
-
 import inspect
 import json
 import pickle
@@ -28,8 +26,6 @@ from contactopt.errors import InputError
 from contactopt.linear.operators import form, has_entries
 from contactopt.problem import InterfaceProblem, Scales, Status, dimensionless
 
-FIND_LIMIT = 60.0  # s for a Python to import the solver
-MOST_MEMORY = 500.0  # MB above which the process makes room for a new one after its answer
 Plain = tuple[str, tuple[int, ...], bytes]
 MOST_HELD = 256  # problems, which many solvers get after one another; a sequence has up to 100
 
@@ -209,7 +205,7 @@ class Peer:
         self.process.stdin.flush()
         if line := self.process.stdout.readline():
             reply = json.loads(line)
-            if reply.get("measured", {}).get("peak_mb", 0.0) > MOST_MEMORY:
+            if reply.get("measured", {}).get("peak_mb", 0.0) > 500.0:  # then a new process follows
                 self.process.kill()
                 self.process.wait()
                 self.process = None
@@ -230,7 +226,10 @@ def _said(python: str, program: str) -> str:
     """The version that a program prints; '' if this Python cannot run it."""
     try:
         done = subprocess.run(
-            [python, "-c", program], capture_output=True, text=True, timeout=FIND_LIMIT
+            [python, "-c", program],
+            capture_output=True,
+            text=True,
+            timeout=60.0,  # s to import the solver
         )
     except (OSError, subprocess.TimeoutExpired):
         return ""

@@ -4,8 +4,6 @@ The campaign's process runs the file, to know what it declares; the functions ar
 only.
 """
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import sys
@@ -110,9 +108,9 @@ def method(
     returned as it is.
 
     A function takes an InterfaceProblem and, by name, its settings; `tol`, `time_limit` [s] and
-    `max_iterations` are passed if it has such arguments, `tol` not at the setting "default" if it
-    has a default. It returns reactions (k, dim), or (reactions,
-    multipliers), or a Solution, or an Answer. Returning forces claims success; raising does not,
+    `max_iterations` are passed if it has such arguments. If `tol` has a default, the setting
+    "default" leaves it out. It returns reactions (k, dim), or (reactions, multipliers), or a
+    Solution, or an Answer. Returning forces claims success; raising does not,
     and InputError means that the problem is not one for this method.
 
     Parameters

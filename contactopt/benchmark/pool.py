@@ -24,10 +24,6 @@ WARM_UP = 30.0
 PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
 # the hard limit is MARGIN * time_limit + GRACE: methods may end by themselves first
 MARGIN, GRACE = 1.1, 0.5
-PEER_GRACE = 30.0  # s for a peer, which ends itself, to start and to take over the problem
-# share of its limit of memory above which a process killed at its limit of time had leaked; Python
-# holds less than its limit when the next request fails
-LEAK = 0.8
 # s of CPU, and of the clock, of a run above which it is not repeated: on a busy machine short runs
 # take long by the clock
 LONG, LONG_WAIT = 1.0, 10.0
@@ -93,7 +89,7 @@ class Worker:
             answer = self._answer(task)
         except Ended as end:
             spent = time.perf_counter() - begin
-            leaked = end.held > LEAK * task.memory_limit
+            leaked = end.held > 0.8 * task.memory_limit  # Python holds less when a request fails
             status = "out_of_memory" if leaked else end.status
             return row | {"status": status, "message": str(end), "call_seconds": spent}
         if alone:
@@ -131,7 +127,7 @@ class Worker:
             try:
                 self._prepare(task)
                 hard = MARGIN * task.time_limit + GRACE
-                hard += PEER_GRACE if task.run.method.peer else 0.0
+                hard += 30.0 if task.run.method.peer else 0.0  # s to start and take the problem
                 answer = self.solver.ask(hard, "solve", worker.execute, task)
             except Ended as end:
                 self.solver.kill()

@@ -1,7 +1,5 @@
 """Problems of an experiment file: scenes, FCLib files and generated families."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -62,10 +60,7 @@ class ProblemSpec:
         return f"{self.name}({given})" if given else self.name
 
     def check(self, declared: Mapping[str, Callable[..., Any]]) -> None:
-        """InputError if the name or a parameter is unknown or out of range. Builds nothing.
-
-        declared  functions of the problems that plug-ins declare, by name
-        """
+        """InputError if the name or a parameter is unknown or out of range."""
         if self.kind == "scene":
             scene(self.name, **self.parameters)
         elif self.kind == "family":

@@ -1,8 +1,4 @@
-"""A process in which code of the user may run, seen from outside: limits of time, the end of all
-that it started, and what it printed last.
-"""
-
-from __future__ import annotations
+"""A process in which code of the user may run: limits of time, its end, and what it printed."""
 
 import os
 import re

@@ -130,10 +130,7 @@ def taken(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def comparable(points: pd.DataFrame) -> pd.DataFrame:
-    """The points of the entrants, which take some problem, on the problems that all of them take.
-
-    A method without a row on a problem was not run there, which counts as a failure.
-    """
+    """The points of the entrants on the problems that all take; a missing row is a failure."""
     takes = taken(points)
     takes = takes.loc[:, takes.any()]
     common = takes.index[takes.all(axis=1)]
@@ -300,9 +297,7 @@ def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def wall_over_cpu(table: pd.DataFrame) -> float:
-    """Wall time over CPU time of the calls, above BUSY of which nothing is ranked: the lower median
-    over the methods of each one's median, since one that sleeps says nothing of the machine.
-    """
+    """Wall time over CPU time of the calls, the lower median over the methods' medians."""
     timed = table[table["cpu_seconds"] > NOISE]
     ratios = (timed["call_seconds"] / timed["cpu_seconds"]).groupby(timed["method"]).median()
     return float(ratios.quantile(0.5, interpolation="lower")) if len(ratios) else np.nan

@@ -199,10 +199,7 @@ def time_against_size(
     by: str = "method",
     labels: Mapping[str, str] = NO_LABELS,
 ) -> Any:
-    """Draw median times of successes against size, with the exponent of the larger sizes n.
-
-    The eight fastest at their largest sizes have colours and names.
-    """
+    """Draw median times of successes against size, with the exponent of the larger sizes n."""
     figure, (ax,) = paper_axes()
     found = []
     for full, rows in groups(table[table["success"]], by):

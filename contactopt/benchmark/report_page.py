@@ -48,7 +48,6 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 RESAMPLES = 400  # bootstrap samples of the problems, drawn again with each change of a filter
 ACCURACIES = (1e-3, 1e-6, 1e-8)  # certificates at which methods are ranked
-MOST_POINTS = 30  # of a curve of convergence
 COLUMNS_SHOWN = (
     "tolerance", "residual", "claimed", "status", "cpu", "low", "high", "wall", "bridge", "memory",
     "repeats",
@@ -171,7 +170,7 @@ def _histories(own: pd.DataFrame, number: dict[str, int], methods: list[str]) ->
     kept = own[(own["repeat"] == 0) & (own["history"].str.len() > 2)].sort_values("tolerance")
     for row in kept.drop_duplicates(["problem", "method"]).itertuples():
         residuals, seconds, _ = json.loads(row.history)
-        chosen = np.unique(np.geomspace(1, len(residuals), MOST_POINTS).astype(int)) - 1
+        chosen = np.unique(np.geomspace(1, len(residuals), 30).astype(int)) - 1  # of a curve
         curves = [[_plain(curve[i]) for i in chosen] for curve in (residuals, seconds)]
         made.append([number[row.problem], methods.index(row.method), *curves])
     return made

@@ -41,10 +41,7 @@ SHADES = 56
 
 
 def publish(experiment: Path, results: Path, reports: Path) -> None:
-    """Take the small table of a campaign over into REPORTS/NAME.
-
-    A large one keeps three digits, and the course of the tightest run of each method alone.
-    """
+    """Copy the table of a campaign to REPORTS/NAME, a large one rounded to three digits."""
     layout = read_layout(experiment)
     drawn = {entry["kind"] for entry in layout.figures}
     left_out = set(LEFT_OUT) - ({"history"} if "leader_table" in drawn else set())
@@ -100,10 +97,7 @@ def write_report(
     formats: Sequence[str] = (),
     said: Sequence[str] = (),
 ) -> str:
-    """Write report.md into a folder, and its pictures as PNG and in more formats; its Markdown.
-
-    said  sentences about the rows, which stand at its end
-    """
+    """Write report.md with `said` at its end, and its pictures, to a folder; its Markdown."""
     parts = [f"# {_one_line(layout.title)}", layout.text.strip()]
     if layout.findings:
         found = enumerate(_findings(layout, table), 1)

@@ -1,7 +1,5 @@
 """What is run: a problem, a method, a setting, a repeat."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Sequences of consecutive problems: the states of one structure, along a load or in time."""
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property

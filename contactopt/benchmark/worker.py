@@ -2,8 +2,6 @@
 at any moment (contactopt.benchmark.process), keep what was loaded, and judge nothing.
 """
 
-from __future__ import annotations
-
 import errno
 import inspect
 import os
@@ -176,9 +174,7 @@ def _word(error: BaseException) -> str:
 
 
 def _along(call: Call, problem: InterfaceProblem | States, limit: float) -> Answer:
-    """The answer of a method to a problem, or to one state of a sequence after the other: sums of
-    what was measured, or the first state without an answer.
-    """
+    """The answer to a problem or to all states of a sequence, or the first state without one."""
     if isinstance(problem, InterfaceProblem):
         return call(problem, False, limit)
     answers: list[Answer] = []

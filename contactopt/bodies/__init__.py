@@ -3,8 +3,6 @@
 A new kind of body is one module and one line of the table BODIES.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 from contactopt.bodies.assembled import AssembledBody

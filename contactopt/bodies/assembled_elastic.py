@@ -1,7 +1,5 @@
 """An elastic body whose surfaces are known, before it is condensed (contactopt.bodies.elastic)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

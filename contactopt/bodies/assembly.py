@@ -1,7 +1,5 @@
 """One elastic body as matrices: stiffness, loads, held and driven unknowns, contact nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property

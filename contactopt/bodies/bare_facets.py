@@ -6,8 +6,6 @@ to nobody and have no weight. Facets of three nodes in the plane are those of qu
 the stiffness says so, else of triangles.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -33,9 +31,7 @@ KINDS = {
     (2, 2): ("RefTri", 2), (2, 3): ("RefTri", 2), (3, 3): ("RefTet", 3), (3, 4): ("RefHex", 4),
     (3, 6): ("RefTet", 3), (3, 8): ("RefHex", 4), (3, 9): ("RefHex", 4),
 }  # fmt: skip
-OF_TRIANGLE = 6  # nodes of one of second order, with which K couples the middle of an edge
 BESIDE = 0.25  # of an edge: how far a node in the middle may lie from it
-DEPTH = 0.5  # of the size of a facet: how deep the element behind it is
 
 
 class BareSurface(NamedTuple):
@@ -143,19 +139,17 @@ def bare_surface(
     every: bool,
     coupled: sp.csr_matrix | None,
 ) -> BareSurface:
-    """The trace of the displacement on facets (f, j) with outward normals (dim, f); `coupled` as in
-    turned_outwards, other arguments as in contactopt.bodies.elements.contact_trace.
-    """
+    """The trace on facets (f, j) with normals (dim, f); arguments as in contact_trace."""
     dim, (kind, corners) = len(points), KINDS[len(points), facets.shape[1]]
     if (dim, facets.shape[1]) == (2, 3) and coupled is not None:
-        many = np.median(np.diff(coupled.indptr)[facets[:, 2]]) > OF_TRIANGLE
+        many = np.median(np.diff(coupled.indptr)[facets[:, 2]]) > 6  # nodes of a triangle
         kind = "RefQuad" if many else kind
     degree = 1 if facets.shape[1] == corners else 2
     known, ends = np.unique(facets[:, :corners], return_inverse=True)
     ends = ends.reshape(len(facets), corners)
     x, count = points[:, known], len(known)
     at = x[:, ends]
-    depth = DEPTH * np.linalg.norm(at[..., 1] - at[..., 0], axis=0) * outward
+    depth = 0.5 * np.linalg.norm(at[..., 1] - at[..., 0], axis=0) * outward  # of the facet's size
     if kind in ("RefHex", "RefQuad"):
         behind = (at - depth[..., None]).reshape(dim, -1)
         added = count + np.arange(behind.shape[1]).reshape(len(facets), corners)

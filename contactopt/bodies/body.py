@@ -47,8 +47,6 @@ if TYPE_CHECKING:
     from contactopt.scenes.body_kinds import Part
     from contactopt.scenes.matrix_part import MatrixPart
 
-CLOSED = 1e-3  # of the area of a face: the length of the integral of its normals that is none
-
 
 def build_body(scene: Scene, part: Part, elements: int, zone: float | None) -> Assembly:
     """Mesh and assemble an elastic part, with `elements` across the contact half-width and the
@@ -215,7 +213,7 @@ def face_of(
     if scene.analysis.revolved:  # all around the axis
         normal, centre = normal * [0.0, 1.0], centre * [0.0, 1.0]
     length = float(np.linalg.norm(normal))
-    if length < CLOSED * area:
+    if length < 1e-3 * area:  # a closed surface has no mean normal
         raise InputError(
             f"body '{part.name}': the normals of {boundary!r} have no mean along which a bolt could"
             " pull, because the boundary is closed; name a face with one side."

@@ -24,8 +24,6 @@ faces around the contact boundary: a node that slides over an edge is lost.
 Source: G. Dhondt, CalculiX CrunchiX USER'S MANUAL.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -45,7 +43,6 @@ from contactopt.scenes.scene import Scene
 FACTOR = 100.0
 WEDGES = 180  # of two degrees make a ring
 LEAST = 0.001  # increment of the load at which ccx gives up; the first is the whole load
-SMOOTH = 0.7  # cosine of the angle up to which a face beside the contact boundary goes on with it
 
 
 def deck(scene: Scene, factor: float = FACTOR) -> str:
@@ -180,7 +177,7 @@ class _Numbered:
             np.full((mesh.dim(), len(beside), 1), 0.0), mesh.f2t[0, beside], beside, mesh.t2f
         )[:, :, 0]
         mean = normals[:, np.isin(beside, own)].mean(axis=1)
-        return np.asarray(beside[np.isin(beside, own) | (mean @ normals > SMOOTH)])
+        return np.asarray(beside[np.isin(beside, own) | (mean @ normals > 0.7)])  # about smooth
 
     def surface(self, name: str, facets: np.ndarray) -> Iterator[str]:
         """A surface of ccx, by elements and the numbers of their faces."""

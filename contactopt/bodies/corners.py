@@ -16,8 +16,6 @@ of two facets at their common node decides, those of curved elements being exact
 * Where the curve of the boundary is given, its own turn must exceed `KINK`.
 """
 
-from __future__ import annotations
-
 from itertools import permutations
 from typing import NamedTuple
 
@@ -32,10 +30,6 @@ from contactopt.meshes.given_curves import Curve
 ALIKE = 0.45  # a tangent line before an arc halves the turn: more than this is the turn of a curve
 PARALLEL = 0.7  # cosine of the angle between edges across which a surface turns in the same way
 STEEP, EXACT = 0.5, 1e-9  # tilts that are never smooth, and that are rounding
-# a polygon of equal facets is tilted by once the turn to the next normal, one whose second facet is
-# tiny by twice as much; with a margin
-UNEQUAL = 4.0
-STEP = 1e-3  # of a facet, at which the direction of a given curve is taken
 
 
 class _Joints(NamedTuple):
@@ -161,7 +155,7 @@ def _bent(
     x = p[:, side].mean(axis=1)
     directions = []
     for facet in joints.facets[:, some]:
-        into = STEP * (p[:, ends[:, facet]].mean(axis=1) - x)
+        into = 1e-3 * (p[:, ends[:, facet]].mean(axis=1) - x)  # of a facet, along a given curve
         d = curve(x + 2 * into) - curve(x + into)
         if len(side) == 2:
             edge = p[:, side[1]] - p[:, side[0]]
@@ -199,4 +193,4 @@ def smooth_tilts(normals: np.ndarray, cells: np.ndarray) -> np.ndarray:
     turn = next_to.copy()  # to the next facet: a straight one of second order has two cells
     for corner, other in permutations(cells, 2):
         np.maximum.at(turn, corner, next_to[other])
-    return np.minimum(STEEP, EXACT + UNEQUAL * turn)
+    return np.minimum(STEEP, EXACT + 4.0 * turn)  # twice what unequal facets need

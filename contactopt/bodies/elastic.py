@@ -39,7 +39,6 @@ from contactopt.linear.saddle_point import BodyTerm
 from contactopt.scenes.scene import Part, Scene
 
 log = logging.getLogger(__name__)
-KERNEL = 1e-10  # a plate motion resisted by less than this fraction of the body's stiffness is free
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +233,7 @@ def condense(
     K = extended.T @ (whole @ extended)
     stiffness, vectors = np.linalg.eigh((K + K.T) / 2)
     own = np.sum(body.motion * (whole @ body.motion), axis=0)
-    moves = stiffness <= KERNEL * np.max(own, initial=0.0)
+    moves = stiffness <= 1e-10 * np.max(own, initial=0.0)  # of the stiffness: the plate is free
     # one multiplier per plate component that moves freely, whatever the others do
     free = vectors[:, moves]
     leading = np.sort(la.qr(free.T, pivoting=True, mode="r")[1][: free.shape[1]])

@@ -1,7 +1,5 @@
 """Displacement and stress inside a body of finite elements, computed element by element."""
 
-from __future__ import annotations
-
 import numpy as np
 import skfem
 

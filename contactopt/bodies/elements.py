@@ -60,7 +60,6 @@ TIED = {
 }
 Density: TypeAlias = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Weight: TypeAlias = tuple[float, bool]  # of integrals: a factor, and whether they carry r as well
-SMOOTH = 6  # order of the quadrature of a load on curved faces
 
 
 class Trace(NamedTuple):
@@ -273,7 +272,7 @@ def _rule(
     basis: skfem.CellBasis, boundary: np.ndarray, weight: Weight
 ) -> tuple[Faces, np.ndarray, np.ndarray]:
     """Points of a quadrature on facets (f,), their places (dim, f, q) and weights (f, q)."""
-    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], SMOOTH)
+    points, share = get_quadrature(FACES[basis.mesh.refdom.__name__][0], 6)  # for curved faces
     at = Faces(basis.mesh, np.asarray(boundary), points)
     places = at.places
     return at, places, at.scale * share * weight_at(weight, places)
@@ -297,9 +296,7 @@ def mean_normals(basis: skfem.CellBasis, degree: int, boundary: np.ndarray) -> n
 def _cell_rule(
     name: str, places: np.ndarray, cells: np.ndarray, degree: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Hat functions (v, point) on a cell, and the points (dim - 1, q) and weights (q,) of the
-    reference face's rule of one rule per cell.
-    """
+    """Hat functions (v, point) on a cell, and the reference face's points and weights (q,)."""
     face, hat = FACES[name][:2]
     points, share = get_quadrature(face, degree + 2)
     phi = np.stack([hat.lbasis(points, v)[0] for v in range(cells.shape[1])])

@@ -1,7 +1,5 @@
 """What is read inside a body: where, and what displacement and stress are found there."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The matrices of a body that another code has assembled, its solver if it gave one, its file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -23,8 +23,6 @@ Sources: Love (1929), The stress produced in a semi-infinite solid by pressure o
 boundary; Johnson (1985), Contact Mechanics, sections 2.2, 3.2 and 3.6.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

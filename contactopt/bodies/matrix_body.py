@@ -261,9 +261,7 @@ def _coupled(K: sp.csr_matrix, numbers: np.ndarray) -> sp.csr_matrix:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Points x (dim, N) whose unknowns have the rows `numbers` (dim, N) of u = D U, and are `fixed`
-    (rows,) or not.
-    """
+    """Points x (dim, N) whose unknowns have rows `numbers` of u = D U, and may be `fixed`."""
 
     x: np.ndarray
     numbers: np.ndarray

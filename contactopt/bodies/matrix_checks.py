@@ -2,8 +2,6 @@
 found by its rigid motions, which need no force, and by its extreme eigenvalues.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +19,6 @@ from contactopt.errors import InputError
 from contactopt.scenes.kinds import Kind
 from contactopt.scenes.matrix_part import MatrixPart
 
-BALANCED = 1e-7  # sum of the forces of a rigid motion over their sizes: below it, it is rounding
 PIVOT = 1e-13  # of the largest eigenvalue: one below it belongs to a motion without stiffness
 STEPS = 12  # of Lanczos's method
 FEW = 2  # of its steps find a motion without stiffness, which the first one makes large
@@ -56,7 +53,7 @@ def _numbering(
     gaps = D @ R - points
     forces, sizes = K @ R, abs(K) @ np.abs(R)
     loaded = np.divide(forces, sizes, out=np.zeros(forces.shape), where=sizes > 0)
-    loaded[np.abs(loaded) < BALANCED] = 0.0
+    loaded[np.abs(loaded) < 1e-7] = 0.0  # rounding of the forces' sizes
     tried = (np.diff(K.indptr) > 1) & sizes.any(axis=1)
     rows = loaded[tried & loaded.any(axis=1)]
     rows = rows / np.abs(rows).max(axis=1, keepdims=True)

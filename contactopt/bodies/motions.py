@@ -19,8 +19,6 @@ solution algorithm, Int. J. Numer. Meth. Engng 32, 1205-1227, for floating bodie
 multipliers of the interface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,9 +76,7 @@ def _planes(dim: int) -> list[tuple[int, int]]:
 
 
 def free_motions(kind: Kind, basis: skfem.CellBasis, held: np.ndarray, weight: Weight) -> Motions:
-    """The rigid motions of a body that leave all held unknowns (n,) at rest, with inertia by the
-    measure `weight`; where axisymmetric, the one along the axis.
-    """
+    """The rigid motions that leave held unknowns (n,) at rest, with inertia by `weight`."""
     R, labels = whole_motions(kind, basis)
     combined, names = kernel(R[held], labels)
     Z = R @ combined

@@ -1,7 +1,5 @@
 """Elastic stiffness of a mesh of displacement elements."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -10,14 +8,9 @@ import skfem
 
 from contactopt.bodies.elements import Weight, weight_at, with_jacobians
 
-PIECE = 2**18  # entries of element matrices that are held at the same time; they stay in the cache
-
 
 class Stiffness(sp.bsr_matrix):
-    """A matrix in blocks of nodes, which take three quarters of the memory of compressed rows.
-
-    Indexing gives compressed rows of what is asked for.
-    """
+    """A matrix in blocks of nodes, which need less memory; indexing gives compressed rows."""
 
     def __getitem__(self, key: Any) -> Any:
         return self.tocsr()[key]
@@ -46,7 +39,7 @@ def isotropic_stiffness(
     known += graph.indices  # ascending
     data = np.zeros((len(known), dim, dim))
     within = np.arange(dim * dim).reshape(dim, dim)
-    size = max(PIECE // (dim * nodes.shape[1]) ** 2, 1)
+    size = max(2**18 // (dim * nodes.shape[1]) ** 2, 1)  # entries stay in the cache
     for start in range(0, len(nodes), size):
         piece = np.arange(start, min(start + size, len(nodes)))
         own = nodes[piece].astype(np.int64)

@@ -45,8 +45,6 @@ from contactopt.errors import InputError
 from contactopt.meshes.cells import straight
 from contactopt.meshes.structured import simplices
 
-# how far beyond an element a point may lie, over its size: an arc lies beyond a coarse mesh
-OUTSIDE = 0.2
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
 STEEP = 12.0  # of the weights: `pytest tests/test_recovery.py -k hole`, error 0.08, with 0: 0.20
 
@@ -208,7 +206,7 @@ def _places(name: str, mesh: Mesh, region: Region) -> tuple[np.ndarray, np.ndarr
     places = mesh.p[:, vertices]
     if len(point):
         corners, beyond = _holder(mesh, point)
-        if beyond <= OUTSIDE:
+        if beyond <= 0.2:  # of its size: an arc lies beyond a coarse mesh
             own = sp.csr_matrix(
                 (np.ones(len(corners)), (np.zeros(len(corners), int), corners)), (1, count)
             )

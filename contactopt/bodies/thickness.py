@@ -10,8 +10,6 @@ Source: Boffi, Brezzi, Fortin (2013), Mixed Finite Element Methods and Applicati
 section 5.1.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import skfem
 from scipy.spatial import KDTree
@@ -19,7 +17,6 @@ from scipy.spatial import KDTree
 # thickness over the length of a facet: at .2 a layer of quadratic triangles has the stresses of one
 # of quadrilaterals, at .1 half as much again (tests/test_thin_layers.py)
 THIN = 0.25
-OPPOSITE = -0.9  # the cosine between normals of the two sides of a plate is below this
 NEAREST = 16  # facets of the other side among which the one beneath is looked for
 
 
@@ -40,7 +37,7 @@ def thin_facets(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
     apart = middle[:, None, flat] - there[:, near]
     depth = np.sum(apart * normal[:, None, flat], axis=0)
     aside = np.linalg.norm(apart - depth * normal[:, None, flat], axis=0)
-    beneath = np.sum(turned[:, near] * normal[:, None, flat], axis=0) < OPPOSITE
+    beneath = np.sum(turned[:, near] * normal[:, None, flat], axis=0) < -0.9  # cosine of two sides
     beneath &= (depth > 0) & (depth < THIN * size[flat]) & (aside < size[flat] + width[near])
     thin[flat] = beneath.any(axis=0)
     return thin

@@ -16,8 +16,6 @@ Source: Rockafellar (1976), Monotone operators and the proximal point algorithm,
 Optim. 14, 877-898.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -28,7 +26,6 @@ from contactopt.bodies.elements import weight_at
 
 # stiffness of the ground over that of a block of the softest material on the contact surface
 SHARE = 1e-5
-THIN = 20.0  # bodies softer than this many times such a ground are thin
 
 
 def volumes(body: Assembly) -> np.ndarray:
@@ -49,7 +46,7 @@ def is_thin(body: Assembly, relieved: Callable[[np.ndarray], np.ndarray]) -> boo
     forces = M * np.random.default_rng(0).standard_normal(len(body.load))
     U = relieved(forces)
     ground = _per_volume(body, M, body.material.E) * float(U @ (M * U))
-    return float(U @ (body.A @ U)) < THIN * ground
+    return float(U @ (body.A @ U)) < 20.0 * ground  # grounds: softer ones are thin
 
 
 def _per_volume(body: Assembly, M: np.ndarray, modulus: float) -> float:

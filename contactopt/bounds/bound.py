@@ -59,8 +59,6 @@ Methods Appl. Mech. Eng. 186; Weiss, Wohlmuth (2009), A posteriori error estimat
 for contact problems, Math. Comp. 78.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -153,9 +151,7 @@ class Bound:
     def balanced_with(
         self, tractions: np.ndarray, multipliers: np.ndarray, forces: tuple[Any, ...] | None = None
     ) -> Data:
-        """Stresses in equilibrium with contact tractions and the loads; of an adjoint with the
-        `forces` on its bodies in their place, where the forces A u_h are those of the stress of v.
-        """
+        """Stresses in equilibrium with contact tractions and loads, or an adjoint's `forces`."""
         scene, out = self.scene, list[Any]()
         own = scene.reduction.own_multipliers(multipliers)
         for i, (body, cells) in enumerate(zip(scene.bodies, scene.cells)):

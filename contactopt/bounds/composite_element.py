@@ -5,8 +5,6 @@ It has as many parameters as there are moments of tractions on the boundary and 
 the parts. Here one body force serves all parts. Sources: as contactopt.bounds.tetrahedra.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
@@ -21,9 +19,7 @@ def components() -> list[tuple[int, int]]:
 
 @cache
 def reference_stress() -> np.ndarray:
-    """The stress (value, component, input) of the reference element by the inputs: moments of
-    tractions, then a body force. Integrals of products are WEIGHT times sums over the values.
-    """
+    """The stress (value, component, input) by inputs; integrals are WEIGHT times sums."""
     d = 3
     x = np.concatenate([np.zeros((1, d)), np.eye(d)])
     pairs, n = components(), d + 1

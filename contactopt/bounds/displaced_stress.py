@@ -1,6 +1,4 @@
-"""The stress of a displacement at points of triangles: of a quadratic one, or of a bilinear one on
-the quadrilaterals that the triangles are halves of.
-"""
+"""The stress of a quadratic displacement, or of a bilinear one in halved quadrilaterals."""
 
 from __future__ import annotations
 

@@ -23,8 +23,6 @@ for tractions as unknowns; Love (1927), A treatise on the mathematical theory of
 188, for bodies of revolution; else as contactopt.bounds.split_triangle.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -64,9 +62,7 @@ class _Elements(NamedTuple):
 
 
 class _System(NamedTuple):
-    """All elements, the second derivative K of half the energy by all tractions, and the program
-    for those that are to be found.
-    """
+    """All elements, half the energy's second derivative by tractions, and the program for these."""
 
     parts: list[_Elements]
     K: sp.csr_matrix

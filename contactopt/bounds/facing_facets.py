@@ -4,8 +4,6 @@ intervals in the plane. In space they are triangles, of which polygons are made 
 contactopt.coupling.segments cuts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import cache
 from itertools import combinations
@@ -27,7 +25,6 @@ from contactopt.solving.solve_scene import Solved
 
 SPLIT = {2: 16, 3: 4}  # parts of an edge of a contact facet for integrals over it
 PARTS = {2: 16, 3: 2}  # and of an edge of a piece of one
-FACING = -0.5  # the cosine between opposite normals is below this
 
 
 class Points(NamedTuple):
@@ -172,9 +169,7 @@ class FacingFacets:
         nodal[side.body][:] += side.sign * self.frame[component][:, None] * added
 
     def moments(self, number: int, tractions: np.ndarray) -> np.ndarray:
-        """(v, f, dim) of tractions (k, dim) on one of the sides with the hat functions. Next to an
-        axis of revolution they are those of the linear traction that is zero there.
-        """
+        """(v, f, dim) of tractions (k, dim) on a side with hat functions, zero on an axis."""
         side, points = self.sides[number], self.rule
         t = self.of_contacts(tractions)[:, points.facets[0]] @ self.frame  # (v, S, dim)
         own = np.einsum(
@@ -242,7 +237,7 @@ def _meeting(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray
         axis = np.zeros((centre.shape[1] + 1, len(centre)))
         axis[-1] = up
         balls.append(Facets(np.vstack([centre.T, 0 * radius]), radius, axis, 0 * radius))
-    return facing_pairs(balls[0], balls[1], FACING)
+    return facing_pairs(balls[0], balls[1], -0.5)  # the cosine of opposite normals
 
 
 def _common(own: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,5 @@
 """What is guaranteed, and not only estimated, of the error of a solved scene."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

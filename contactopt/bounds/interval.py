@@ -66,9 +66,7 @@ LINEAR = "approach", "shift", "normal_force", "shear_force", "resultant"
 
 
 class _Adjoint(NamedTuple):
-    """Tractions (k, dim), displacements z of the bodies, the constant c, and the known work of
-    Tresca's friction in y_t.
-    """
+    """Tractions (k, dim), z of the bodies, the constant c, and Tresca's known work in y_t."""
 
     tractions: np.ndarray
     z: list[np.ndarray]

@@ -1,7 +1,5 @@
 """A quadratic form made least under linear equations, by an augmented Lagrangian."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
@@ -10,7 +8,6 @@ from contactopt.errors import InputError
 
 SOFT = 1e-12  # of the scaled form: equations leave nothing free
 STIFF = 1e6  # of the equations, in the same scale
-BALANCED = 1e-11  # of the largest share in an equation, so much may be missing
 
 
 class LeastInBalance:
@@ -44,6 +41,6 @@ class LeastInBalance:
             multipliers += STIFF * missed
             largest = float((abs(C) @ np.abs(x)).max(initial=0.0)) or 1.0
             found = float(np.abs(missed).max(initial=0.0)) / largest
-            if number and found < BALANCED:
+            if number and found < 1e-11:  # of the largest share in an equation
                 break
         return self._scale * x, found

@@ -45,14 +45,11 @@ if TYPE_CHECKING:
     from contactopt.bounds.tetrahedra import Tetrahedra
 
 
-GAIN = 0.05  # of the energy: a step that makes it less by a smaller share is the last one
 STEPS = 30  # at most
 
 
 class ForceResponse(NamedTuple):
-    """The degree of a body's displacements, and those (dim, nodes) under nodal forces per
-    thickness.
-    """
+    """The degree of displacements, and those (dim, nodes) under forces per thickness."""
 
     degree: int
     moved: Callable[[np.ndarray], np.ndarray]
@@ -158,7 +155,7 @@ class BalancedMoments:
             step = size / float(np.sum(way * turned))
             m, left = m + step * way, left - step * turned
             twice -= step * size
-            if step * size < GAIN * twice:
+            if step * size < 0.05 * twice:  # the last step gains less of the energy
                 break
         return m
 

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from contactopt.bodies.protocol import Body
 
 THIN = 3e4  # length over height: half as much again is past what rounding permits
-CLEAR = 1.5  # of the bubbles that a facet beside the pressure needs, so that it stays open
 
 
 class PressedScene:
@@ -91,7 +90,7 @@ class PressedScene:
             return None
         elements = elements_of(body)
         if elements is None:
-            raise InputError(f"body '{body.name}' has no elements here; a bound needs them.")
+            raise InputError(f"body '{body.name}' has no elements, which a bound needs.")
         mesh, degree, name = elements.basis.mesh, elements.degree, f"body '{body.name}'"
         shape = mesh.refdom.__name__
         linear = ("RefQuad",) if degree == 1 else ()
@@ -223,7 +222,7 @@ class PressedScene:
                 gap, bubble = control_points(gap, d), control_points(bubble, d)
             found = np.divide(-gap, bubble, out=np.zeros(gap.shape), where=bubble > CLOSE)
             np.maximum.at(more, points.facets[0], found.max(axis=1))
-            more[~closed.all(axis=1)] *= CLEAR
+            more[~closed.all(axis=1)] *= 1.5  # so that facets beside the pressure stay open
             pair.lift(out, more[:, None] * (np.arange(nodes.shape[1]) >= d))
         return out
 
@@ -254,9 +253,7 @@ class PressedScene:
     def boundary(
         self, number: int, tractions: np.ndarray, loaded: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Body force (dim,), held components (facets, dim) and moments of tractions (facets, dim,
-        dim) of a body, as Tetrahedra.equilibrated() takes them; not `loaded`: of the contact alone.
-        """
+        """Body force, held components and moments, as Tetrahedra.equilibrated() takes them."""
         scene, mesh, d = self.reduction.scene, self.cells[number].mesh, self.problem.dim
         part: Any = scene.parts[number]
         force, components = np.zeros(d), scene.components

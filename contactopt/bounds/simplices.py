@@ -1,7 +1,5 @@
 """Straight-edged triangles and tetrahedra: what the stresses on them need of their shape."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,9 +11,7 @@ from skfem import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Simplices:
-    """Straight-edged triangles or tetrahedra of scikit-fem, with displacements and stresses on
-    them.
-    """
+    """Straight-edged triangles or tetrahedra, with displacements and stresses on them."""
 
     mesh: Mesh
 

@@ -9,8 +9,6 @@ elasticity problems, Numer. Math. 30, for k = 1; Gopalakrishnan, Guzman, Lee (20
 Johnson-Mercier elasticity element in any dimensions, for others.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations

@@ -34,8 +34,6 @@ finite element methods for two-dimensional elasticity problems, Numer. Math. 30;
 Guzman, Lee (2024), The Johnson-Mercier elasticity element in any dimensions.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -74,10 +72,7 @@ class Tetrahedra(Simplices):
         return 2 * shear * strain + lam * trace * np.eye(d)
 
     def data(self, moments: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """(e, inputs) what determines the composite stress on the reference element: force (dim,)
-        or (e, dim) per volume, and moments (dim + 1, dim, e, dim) of outward tractions on the
-        facets.
-        """
+        """(e, inputs) of the reference element: force per volume, and moments of tractions."""
         own = moments.reshape(-1, *moments.shape[2:])
         body = np.broadcast_to(self.ratio[:, None] * force, own.shape[1:])
         both = np.concatenate([own, body[None]]).transpose(1, 2, 0)  # in the axes of space

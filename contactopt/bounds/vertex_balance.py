@@ -1,7 +1,5 @@
 """The balance of elements at their vertices, the first step of contactopt.bounds.tetrahedra."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -45,9 +43,7 @@ class Balance:
 
 
 def _inverse(balance: sp.csc_matrix) -> Callable[[np.ndarray], np.ndarray]:
-    """The inverse of D D' for the balance D of elements by facets: one block for each vertex. Where
-    nothing holds a vertex, one of its equations follows from the others.
-    """
+    """The inverse of D D' in blocks for vertices; a free vertex has a dependent equation."""
     D = (balance @ balance.T).tocoo()
     count, group = connected_components(D, directed=False)
     # where each facet at a vertex joins two elements, the sum of all equations is zero

@@ -4,8 +4,6 @@ Exit codes: 0 done (run: solved, and to the accuracy asked for), 1 not solved, 2
 be used, 130 interrupted.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 from collections.abc import Callable, Iterator, Sequence

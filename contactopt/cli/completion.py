@@ -6,8 +6,6 @@ zsh:   contactopt completion zsh >> ~/.zshrc
 fish:  contactopt completion fish > ~/.config/fish/completions/contactopt.fish
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import json

@@ -1,7 +1,5 @@
 """The parser of the command line, made of command_line.toml and of the options of a run."""
 
-from __future__ import annotations
-
 import argparse
 import tomllib
 from collections.abc import Callable, Mapping

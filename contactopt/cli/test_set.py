@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from contactopt.benchmark.testset import Problem
     from contactopt.problem import InterfaceProblem
 
-SHOWN = 8  # contacts up to which the forces of all solutions are printed
-TOL = 1e-10  # certificate of the forces at which subproblems are made
-
 
 def problems(options: argparse.Namespace) -> int:
     """List, show or write problems of a test set."""
@@ -73,7 +70,7 @@ def _print_solutions(one: Problem) -> None:
     tags = one.tags
     if not tags["feasible"]:
         _print_proof(states_of(one.load())[-1])
-    elif (tags.get("solutions") or 0) > 1 and tags["contacts"] <= SHOWN:
+    elif (tags.get("solutions") or 0) > 1 and tags["contacts"] <= 8:  # with few forces to print
         from contactopt.methods.enumeration import all_solutions
 
         for number, solution in enumerate(all_solutions(states_of(one.load())[0]), 1):
@@ -125,7 +122,7 @@ def _written(one: Problem, stem: Path, form: str, kinds: list[str] | None) -> It
             fclib.write(problem.explicit(), path, one.name)
             yield path
             continue
-        answer = solve(problem, tol=TOL)
+        answer = solve(problem, tol=1e-10)  # subproblems need exact forces
         if not answer.solved:
             raise InputError(f"it was not solved ({answer.status}).")
         for kind in kinds or programs.PROGRAMS:

@@ -1,7 +1,5 @@
 """From reactions back to the bodies: displacements and stresses (paper, eq (13))."""
 
-from __future__ import annotations
-
 from contactopt.bodies.fields import Fields
 from contactopt.bodies.views import fields as fields_of
 from contactopt.coupling.reduction import Reduction

@@ -1,7 +1,5 @@
 """Whether the two ends of each bolt are equal and opposite forces on one line."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -2,8 +2,6 @@
 planes of symmetry and areas alone: a body that is turned takes them along.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes

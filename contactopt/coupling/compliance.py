@@ -1,7 +1,5 @@
 """Q, the compliance of the bodies at the contacts: an array, sparse rows, or its products."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -7,8 +7,6 @@ MOST_EXPLICIT and AGAIN are not fitted but chosen: an array of half a gigabyte, 
 that takes less than half the time of factors.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -11,8 +11,6 @@ Reduction, recovery, energies and load paths use these maps alone. How they come
 to the kind of the coupling.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

@@ -6,8 +6,6 @@ elements alike. The multipliers live on linear cells, the same as on one body al
 (contactopt.bodies.elements): halves of lines, quarters of squares, whole triangles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property

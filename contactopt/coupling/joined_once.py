@@ -1,7 +1,5 @@
 """No facet is joined to one body twice, under whatever names: the pairs would share one force."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """The rotation of a surface about its contacts, which carries displacements along levers."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 

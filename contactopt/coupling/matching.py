@@ -1,7 +1,5 @@
 """The coupling of bodies whose contact nodes match: each has its partner on the other body."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

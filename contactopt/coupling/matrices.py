@@ -14,8 +14,6 @@ and of the scene Q, q, V, s and mu of contactopt.problem.interface_problem: u = 
 V' r + s = 0.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

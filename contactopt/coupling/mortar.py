@@ -67,8 +67,6 @@ formulations using dual Lagrange multipliers, Comput. Methods Appl. Mech. Engrg 
 motions of curved interfaces).
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 
@@ -272,12 +270,7 @@ def _centres(surface: Faces) -> np.ndarray:
 
 
 def _alone(
-    own: Faces,
-    other: Faces,
-    points: Overlap,
-    nodes: np.ndarray,
-    x: np.ndarray,
-    normals: np.ndarray,
+    own: Faces, other: Faces, points: Overlap, nodes: np.ndarray, x: np.ndarray, normals: np.ndarray
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """The own node of every contact, and the other side's shape functions on its normal."""
     k = len(nodes)

@@ -8,8 +8,6 @@ mean of f plus the slopes of the fit, from hat functions less their means on G: 
 system then does not depend on where G lies in the cell, but on its shape alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

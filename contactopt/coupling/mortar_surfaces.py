@@ -1,7 +1,5 @@
 """The mortar coupling of bodies whose contact nodes do not match, from faces to the maps T."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import replace
 
@@ -27,7 +25,7 @@ FEWEST = 0.95
 # Displacements move contacts apart from each other if the singular value is above the second one
 # times the largest.
 ACROSS, APART = 1e-3, 0.1
-MOST_HELD = 1000  # contacts at held nodes up to which these singular values are computed
+MOST = 1000  # contacts or nodes up to which these singular values are computed
 
 log = logging.getLogger(__name__)
 
@@ -133,16 +131,12 @@ def _crowded(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> int:
     """How many held contacts are more than the other side can move independently."""
     held, other = _held(made, sides[made.own], meshes[made.own]), meshes[1 - made.own]
     still = np.all(held | (np.abs(made.normals) <= ACROSS), axis=0)
-    if not 0 < still.sum() <= MOST_HELD:
+    if not 0 < still.sum() <= MOST:
         return 0
     W = made.weights[1 - made.own][np.flatnonzero(still)]
     W = W[:, np.flatnonzero(~other.held.all(axis=0))]
     W = W[np.diff(W.indptr) > 0]  # contacts that both sides hold are none
-    if not W.shape[0]:
-        return 0
-    W = W[:, np.unique(W.indices)].toarray()
-    values = np.linalg.svd(W, compute_uv=False)
-    return int(W.shape[0] - np.sum(values > APART * values[0]))
+    return int(W.shape[0]) - _independent(W)
 
 
 def _per_node(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> float:
@@ -153,8 +147,20 @@ def _per_node(made: Mortar, sides: list[Faces], meshes: list[Mesh]) -> float:
     W, faces = made.weights[other], sides[other].faces[meshes[other].thin]
     seen = np.diff(W.tocsc().indptr) > 0
     covered = faces[seen[faces].all(axis=1)]
-    count = np.asarray(W.sum(axis=0)).ravel()[covered].mean(axis=1)
-    return float(count.min(initial=1.0))
+    count = np.asarray(W.sum(axis=0)).ravel()[covered].mean(axis=1).min(initial=1.0)
+    nodes = np.unique(covered)
+    if count < FEWEST and len(nodes) <= MOST and _independent(W[:, nodes]) == len(nodes):
+        return 1.0
+    return float(count)
+
+
+def _independent(W: sp.csr_matrix) -> int:
+    """How many displacements of nodes move contacts apart from each other, by weights (k, n)."""
+    W = W[np.diff(W.indptr) > 0]
+    if not W.shape[0]:
+        return 0
+    values = np.linalg.svd(W[:, np.unique(W.indices)].toarray(), compute_uv=False)
+    return int(np.sum(values > APART * values[0]))
 
 
 def _whole_where_even(side: Faces, nodes: np.ndarray, normals: np.ndarray) -> Faces:

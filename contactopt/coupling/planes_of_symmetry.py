@@ -1,7 +1,5 @@
 """Planes of symmetry, recognised by what supports hold or named by the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -2,8 +2,6 @@
 interface problem once Q is known.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from types import SimpleNamespace

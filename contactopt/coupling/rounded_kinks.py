@@ -22,8 +22,6 @@ Source of the recovery: Zhang, Naga (2005), A new finite element gradient recove
 superconvergence property, SIAM J. Sci. Comput. 26, 1192-1213.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import KDTree

@@ -4,8 +4,6 @@
 Tolerances that follow from rounding stand beside the code that uses them.
 """
 
-from __future__ import annotations
-
 # Linear systems solved by iteration (contactopt.derivatives.linear).
 # reduction of the residual by one round of GMRES, and by GMRES for the model of Q
 ROUND, INNER = 1e-4, 1e-6

@@ -13,8 +13,6 @@ The same factors are those of an LU factorisation of K', K' = P L U, which `Whol
 array. Then K x = b is solved by two triangular systems wherever the array is taken.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -32,7 +30,6 @@ from contactopt.linear.operators import asymmetry
 from contactopt.methods.kernels.bonded import LEAST_PIVOT
 
 SINGULAR = 1e-13  # reciprocal condition of a matrix below which it counts as singular
-DOUBT = 1e-6  # least pivot, over the largest, below which the condition is looked at
 UNSEEN = 1e-8  # relative residual up to which a singular system counts as solved
 UNIQUE = (
     "the solution has no derivative, because its linear system is singular: forces or motions are"
@@ -68,9 +65,7 @@ class Whole(NamedTuple):
 
 
 class Square:
-    """LU of the transpose of a matrix S (m, m), which is overwritten. To a singular S sigma W Z' is
-    added, with W and Z its null vectors from the left and the right.
-    """
+    """LU of the transpose of S (m, m), overwritten; null vectors make a singular S regular."""
 
     def __init__(self, S: np.ndarray):
         self.W, self.sigma = np.zeros((len(S), 0)), 0.0
@@ -79,7 +74,7 @@ class Square:
             return
         self.lu, self.swaps, _ = dgetrf(S.T, overwrite_a=True)
         pivots = np.abs(self.lu.diagonal())
-        if pivots.min() > DOUBT * pivots.max():
+        if pivots.min() > 1e-6 * pivots.max():  # else look at the condition
             return
         S = np.empty(S.shape)
         S[:, self.order] = (np.tril(self.lu, -1) @ np.triu(self.lu) + np.triu(self.lu)).T

@@ -16,12 +16,7 @@ from contactopt.derivatives.linear import Tangent, transposed
 from contactopt.errors import InputError
 from contactopt.linear.operators import FINEST
 from contactopt.methods.kernels.coupled_newton import improved
-from contactopt.problem import (
-    InterfaceProblem,
-    Scales,
-    Solution,
-    natural_map_residual,
-)
+from contactopt.problem import InterfaceProblem, Scales, Solution, natural_map_residual
 from contactopt.problem.certificate import Moved
 from contactopt.problem.scaling import immovable, scales_of, without_rounding
 

@@ -16,8 +16,6 @@ Sources: Robinson (1980), Strongly regular generalized equations; Luo, Pang, Ral
 4.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,7 +27,6 @@ from contactopt.cards import count
 from contactopt.errors import InputError
 from contactopt.problem.laws.law import Kinks, Law
 
-STEP = 1e-7  # how far into a piece its derivative is read, over the largest force
 EXACT = 1e-6  # relative error of a one-sided derivative at the weakly active contacts
 STEPS, STARTS = 30, 200
 
@@ -138,7 +135,7 @@ class Onesided:
     def _piece(self, dy: np.ndarray, dmu: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """D (m, d, d) of the piece into which dy leads, and (P_mu - P_mu0) dmu (m, d)."""
         sizes = np.abs(dy).max(initial=0.0), self.force * np.abs(dmu).max(initial=0.0)
-        t = STEP * self.force / (float(max(sizes)) or 1.0)
+        t = 1e-7 * self.force / (float(max(sizes)) or 1.0)  # into a piece, over the largest force
         law, place = self.law.shifted(t * dmu), self.y + t * dy
         D = law.project(place)[1].copy()
         D[~law.rough, 1:, :] = 0.0

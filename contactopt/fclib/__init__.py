@@ -5,8 +5,6 @@ that is mostly zeros stays sparse. Format of HDF5: FCLib 1.x,
 https://frictionalcontactlibrary.github.io, which needs h5py (the extra `fclib`).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from contactopt.errors import InputError

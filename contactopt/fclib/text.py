@@ -4,20 +4,18 @@ All numbers are separated by white space: dim, contacts, storage, rows, columns,
 (dim numbers per contact) and mu (one per contact). What follows is ignored.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
 
+from contactopt.cards import count as said
 from contactopt.errors import InputError
 from contactopt.linear.operators import Interface
 from contactopt.problem import InterfaceProblem
 
 DENSE, BLOCKS, SPARSE = range(3)  # storages
-MOSTLY = 1 / 3  # share of entries from which on a matrix is kept as an array
 
 
 class _Numbers:
@@ -28,9 +26,8 @@ class _Numbers:
 
     def floats(self, count: int) -> np.ndarray:
         if count < 0 or count > len(self.words) - self.at:
-            raise InputError(
-                f"it announces {count} numbers where {len(self.words) - self.at} are left"
-            )
+            left = len(self.words) - self.at
+            raise InputError(f"it announces {said(count, 'number')} where the text has {left} more")
         self.at += count
         return np.array(self.words[self.at - count : self.at], dtype=float)
 
@@ -74,7 +71,7 @@ def read_text(path: Path) -> InterfaceProblem:
 
 def compact(W: Interface) -> Interface:
     """An array for a matrix of which more than a third of the entries are there; else as given."""
-    full = sp.issparse(W) and W.nnz >= MOSTLY * W.shape[0] * W.shape[1]
+    full = sp.issparse(W) and 3 * W.nnz >= W.shape[0] * W.shape[1]
     return np.asarray(W.toarray()) if full else W
 
 

@@ -157,9 +157,7 @@ def _bodies(scene: Scene, meshes: Mapping[str, Any], planes: list[Any]) -> list[
         kind, elements = elements_of(mesh)
         block = SimpleNamespace(type=kind, data=elements, dim=scene.dim)
         count = mesh.doflocs.shape[1]
-        values = {
-            "move": np.zeros((1, count, scene.dim)),
-        }
+        values = {"move": np.zeros((1, count, scene.dim))}
         drawn = SimpleNamespace(cells=[block], points=_spatial(mesh.doflocs))
         made.append({"name": name} | body_arrays(drawn, values, planes, inside))
     return made
@@ -197,9 +195,7 @@ def _spread(places: np.ndarray, many: int) -> np.ndarray:
 def _boundaries(
     scene: Scene, part: Part, mesh: Mesh, planes: set[tuple[int, float]]
 ) -> Iterator[dict[str, Any]]:
-    """The named boundaries of a body, what its loads are, and along which axes supports hold it. A
-    boundary in a plane of symmetry, across which the body is shown whole, is hidden.
-    """
+    """The named boundaries of a body, its loads, and the axes along which supports hold it."""
     held = {support.boundary: support.displacement for support in part.supports}
     centre = _spatial(mesh.p.mean(axis=1, keepdims=True))[0]
     size = float(np.ptp(mesh.p, axis=1).max())

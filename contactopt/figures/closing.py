@@ -6,8 +6,6 @@ the bodies with n . (d_upper - d_lower) = g on their surfaces closes them: X + s
 s times the gap that there is, and none where they touch.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

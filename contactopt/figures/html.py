@@ -51,11 +51,7 @@ def _text(array: np.ndarray) -> str:
 
 
 def write_html(
-    file: str | Path,
-    title: str,
-    body: str,
-    data: Mapping[str, Any],
-    programs: Sequence[str],
+    file: str | Path, title: str, body: str, data: Mapping[str, Any], programs: Sequence[str]
 ) -> Path:
     """Write a page that stands alone: title, `body` and programs of pages/ that read `data`."""
     texts = {name: _page_file(name) for name in ("page.css", "start.js", *programs)}

@@ -1,7 +1,5 @@
 """What a mesh file holds, in words that a scene file takes: bodies, boundaries and facing pairs."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,9 +19,7 @@ SHAPE = 0.02  # by how much a boundary may be off a plane or a circle [of 1, of 
 
 
 def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[str, Any]]:
-    """The beginning of a scene file in TOML, with the sizes of bodies and boundaries in comments;
-    and the meshes by the names that it gives to the bodies. `meshes` are by the names of groups.
-    """
+    """The beginning of a scene file in TOML with sizes in comments, and the meshes by its names."""
     named = {re.sub(r"[^\w-]", "-", group or path.stem): mesh for group, mesh in meshes.items()}
     solid = any(len(mesh.p) == 3 for mesh in meshes.values())
     inside, side = ("volume", "area") if solid else ("area", "length")
@@ -68,9 +64,7 @@ def _measure(mesh: Mesh, facets: np.ndarray | None = None) -> tuple[float, np.nd
 
 
 def _shape(mesh: Mesh, facets: np.ndarray) -> str:
-    """The outward normal of a flat boundary; the radius of a circle, a cylinder or a sphere, whose
-    points are x = c + R n with the normal n across its axis.
-    """
+    """The normal of a flat boundary, or the radius of a circle, cylinder or sphere."""
     from skfem.quadrature import get_quadrature
 
     at = Faces(mesh, facets, get_quadrature(mesh.brefdom, DEGREE)[0])

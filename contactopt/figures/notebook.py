@@ -1,8 +1,4 @@
-"""What a notebook shows of a result and of a scene: the tables of the command line and a picture,
-which is made only when it is shown.
-"""
-
-from __future__ import annotations
+"""What a notebook shows of a result and of a scene: tables, and a picture made when shown."""
 
 import base64
 import html

@@ -1,6 +1,4 @@
-"""The files of a run: its figures, fields and numbers, and which of them an earlier run left in a
-folder.
-"""
+"""The files of a run: figures, fields and numbers, and those that an earlier run left."""
 
 from __future__ import annotations
 

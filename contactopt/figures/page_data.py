@@ -1,8 +1,4 @@
-"""What the page of a run shows, read from the files of the run: bodies, contact surfaces and load
-path, for the program in pages/view.js.
-"""
-
-from __future__ import annotations
+"""What the page of a run shows, read from its files, for the program in pages/view.js."""
 
 import csv
 from contextlib import suppress
@@ -32,7 +28,6 @@ from contactopt.figures.style import highest_colour, magnification
 from contactopt.scenes.kinds import KINDS
 
 NEAREST = 16  # how many times as large as the picture of a contact the bodies may be
-TURNS = 0.5  # length of the mean of unit normals below which a surface goes around something
 # cosine of the angle between two faces from which on their edge is drawn
 SHARP = np.cos(np.deg2rad(30))
 # nodes of all bodies in space, up to which the page holds their inside, so that it can be cut: such
@@ -123,9 +118,7 @@ def whole_box(box: np.ndarray, mirrors: list[list[Any]]) -> np.ndarray:
 def _boxes(
     pairs: dict[str, Any], box: np.ndarray, mirrors: list[list[Any]], dim: int
 ) -> list[np.ndarray]:
-    """For each pair the box (2, 3) of the picture of its contact, with mirror images: about what
-    touches; in the plane, where nothing hides another pair, about all that touches.
-    """
+    """For each pair the box (2, 3) of the picture of its contact, with mirror images."""
     found, least = [], float(np.ptp(box, axis=0).max()) / NEAREST
     for mesh in pairs.values():
         pressure = mesh.point_data["contact_pressure"]
@@ -260,7 +253,7 @@ def _contact(
         "lift": packed_short(motion[1]),
         "cells": packed(flat),
         "lines": packed(block.data if line else np.zeros((0, 2), dtype=int)),
-        "normal": (mean / size).tolist() if size > TURNS else None,
+        "normal": (mean / size).tolist() if size > 0.5 else None,  # not around something
         "peak": float(pressure.max(initial=0.0)),
         "place": packed(interface["x"][own].T),
         "states": {

@@ -5,8 +5,6 @@ Elements are named, and their nodes numbered, as in meshio and VTU files. A face
 drawn as pieces between all of its nodes, and its edges as lines through the nodes in their middles.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.meshes.cells import mirrored

@@ -48,9 +48,7 @@ __all__ = [
 ]  # fmt: skip
 # a contact zone whose centre is off the origin by less than this fraction of its half-width
 CENTRED = 0.1
-SMALL = 6.0  # parts of a contact line of which the contact zone fills one, if it is drawn alone
 COLUMNS = 2  # of panels: more could not be read where the figure is 400 pixels wide
-ARROWS = 300  # about as many arrows as a map of tractions can show
 
 
 def contact_line(problem: InterfaceProblem) -> np.ndarray:
@@ -133,13 +131,10 @@ def _shown(
     """The limits of the places that are drawn: all, or those about a small zone that touches."""
     touching = place[contact_status(problem, solution.reactions).touching]
     extent = float(np.ptp(touching)) if len(touching) else 0.0
-    if extent == 0 or SMALL * extent > np.ptp(place):
+    if extent == 0 or 6.0 * extent > np.ptp(place):  # then the zone is drawn alone
         return None, None
     low, high = touching.min() - extent, touching.max() + extent
-    return (
-        low / unit if low > place.min() else None,
-        high / unit if high < place.max() else None,
-    )
+    return (low / unit if low > place.min() else None, high / unit if high < place.max() else None)
 
 
 def _about_origin(
@@ -239,7 +234,7 @@ def stick_map(
     add_legend(ax)
     _plane(scene, problem, ax)
     if largest > 0:
-        every = np.ceil(np.sqrt(status.touching.sum() / ARROWS))
+        every = np.ceil(np.sqrt(status.touching.sum() / 300))  # arrows can be told apart
         row = np.round(problem.chart.places / spacing) % every == 0
         shown = np.flatnonzero(status.touching & row.all(axis=0))
         look = {"angles": "xy", "scale_units": "xy", "scale": largest / (3 * spacing * every)}

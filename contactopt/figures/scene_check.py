@@ -43,7 +43,6 @@ WORDS = {
 # by a solver, and of Q with its copies; `python -m experiments.questions.scene_check` measures them
 PROCESS, STIFFNESS, DENSE = 1.6e8, 40.0, 32.0
 FACTORS = {"superlu": 26.0, "pardiso": 12.0, "multigrid": 0.0}
-POINT = 2.8e3  # bytes for each point of a half-space (reports/half_spaces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +194,7 @@ def _costs(
     """The seconds of every way that is open, and the bytes of the cheapest one."""
     works = [body.work for body in made.bodies]
     if not any(work.stiffness for work in works):
-        return {}, PROCESS + POINT * made.maps[0].shape[0] / scene.dim
+        return {}, PROCESS + 2.8e3 * made.maps[0].shape[0] / scene.dim  # bytes a point
     Q, solver = (options.get(key, "auto") for key in ("Q", "solver"))
     unknowns = round(filling(made.maps) ** 0.5)
     solvers = solvers_there() if solver == "auto" else (solver,)

@@ -2,8 +2,6 @@
 what is known exactly.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from inspect import Parameter, getdoc, signature
 from typing import Any
@@ -21,7 +19,6 @@ from contactopt.scenes.scene import Scene
 
 COLUMNS, ROWS = 60, 24  # of the sketch, at most
 ASPECT = 2.0  # height of a character over its width
-SMALL = 0.2  # a body whose size is a smaller fraction than this of the largest one's is drawn near
 MARKS = "#*o+x%@&"
 
 
@@ -142,7 +139,7 @@ def _window(places: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
     extent = (ends[:, 1] - ends[:, 0]).max(axis=1)
     small = int(np.argmin(extent))
-    if extent[small] > SMALL * extent.max():
+    if extent[small] > 0.2 * extent.max():  # smaller bodies are drawn near
         return low, high
     centre = ends[small].mean(axis=0)
     return np.maximum(low, centre - extent[small]), np.minimum(high, centre + extent[small])

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
 LINE = 0.7  # half of the width of a mesh line [pixels]
-SPARSE = 6.0  # pixels, the least height of a triangle beside whose edges mesh lines are drawn
 DARK, DIM = 0.65, 0.82  # brightness of mesh lines and of faces seen along their plane
 EDGE = 1e-6  # pixels by which triangles are enlarged, so that nothing shows between them
 BLOCK = 1_000_000  # pixels of triangles that are looked at together
@@ -50,7 +49,7 @@ def picture(
     share = _shares(placed[..., :2], own, columns + 0.5, rows + 0.5)
     shown = np.asarray(colours(np.einsum("pi,pi->p", share, values[own])))
     tall = _heights(placed[..., :2])
-    near = np.where(lined & (tall.min(axis=1) > SPARSE)[:, None], tall, np.inf)
+    near = np.where(lined & (tall.min(axis=1) > 6.0)[:, None], tall, np.inf)  # pixels of height
     # share of a corner up to which a pixel is near the edge opposite to it; nothing is near no edge
     near = LINE / near
     line = np.any(share < near[own], axis=1)

@@ -27,8 +27,6 @@ COLUMN, HEIGHT = 85 / 25.4, 62 / 25.4  # of a journal's column and of a row of a
 LETTERS, LINE, MARK = 7.0, 1.1, 3.2  # sizes [pt]
 FORMATS = ("png", "svg", "pdf")
 DPI = 200
-# of the largest displacement, by which the initial gap of a pair may vary and still be one distance
-APART = 1e-3
 # quantile of the von Mises stress where the colours end: singular corners would take them all
 TOP = 0.998
 
@@ -38,7 +36,7 @@ def magnification(size: float, displacement: float, gaps: Sequence[np.ndarray] =
     [length]; 1 where a gap varies, because a shape would be magnified.
     """
     varies = max((float(np.ptp(gap)) for gap in gaps if len(gap)), default=0.0)
-    if displacement == 0 or varies > APART * displacement:
+    if displacement == 0 or varies > 1e-3 * displacement:  # else it is one distance
         return 1.0
     largest = max([displacement, *(float(np.abs(gap).max(initial=0.0)) for gap in gaps)])
     target = 0.08 * size / largest  # of the bodies' size that the largest displacement is drawn as
@@ -64,11 +62,7 @@ def make_axes(ax: Axes) -> Any:
 
 
 def paper_axes(
-    columns: int = 1,
-    rows: int = 1,
-    wide: bool = False,
-    height: float = HEIGHT,
-    placed: bool = True,
+    columns: int = 1, rows: int = 1, wide: bool = False, height: float = HEIGHT, placed: bool = True
 ) -> tuple[Any, np.ndarray]:
     """A figure of one or two columns of a journal, and its flat axes; row `height` in inches."""
     from matplotlib.figure import Figure

@@ -8,8 +8,6 @@ the loop of force and displacement. The bodies move with it where the run wrote 
 which it does if they are small enough (MOST_NUMBERS in contactopt.figures.output).
 """
 
-from __future__ import annotations
-
 import html
 import io
 import json

@@ -48,11 +48,7 @@ class Table:
     """
 
     def __init__(
-        self,
-        file: str,
-        lines: Mapping[Place, int | str],
-        data: dict[str, Any],
-        place: Place = (),
+        self, file: str, lines: Mapping[Place, int | str], data: dict[str, Any], place: Place = ()
     ):
         self.file, self.lines, self.data, self.place = file, lines, data, place
         self.known: list[str] = []

@@ -4,8 +4,6 @@ written.
 Also pipes to other processes, which may be dead when one writes to them.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import shutil

@@ -34,8 +34,6 @@ the difference between two meshes, of which the finer one has elements of half t
 Source: Drucker (1954), Coulomb friction, plasticity, and limit loads, J. Appl. Mech. 21, 71-74.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What was found on two meshes, in words."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

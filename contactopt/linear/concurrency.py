@@ -1,7 +1,5 @@
 """Cores, memory, the threads of BLAS, and the one place where threads share work."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 from collections import deque

@@ -25,7 +25,6 @@ from contactopt.linear.concurrency import cores
 from contactopt.linear.counter import Counter
 from contactopt.linear.operators import Form, InterfaceOperator, check_dense
 
-SINGLE = 2e-6  # accuracy of products from which on single precision serves
 LEVELS = 4  # halvings of the grid that its padding allows for
 LARGE = 2**16  # points from which on transforms use all processors
 Symbols = dict[tuple[int, int], np.ndarray]  # (a, b) with a <= b -> real array
@@ -244,7 +243,7 @@ class Convolution(InterfaceOperator):
 
     def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
         every = tuple(range(self.kernel.dim))
-        single = accuracy is not None and accuracy >= SINGLE
+        single = accuracy is not None and accuracy >= 2e-6  # from which on it serves
         out = np.empty(X.shape)
         for column in range(X.shape[1]):
             parts = X[:, column].reshape(*self.kernel.grid, self.kernel.dim)

@@ -1,7 +1,5 @@
 """How much work was done, counted in one place by all forms of an operator that share the work."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

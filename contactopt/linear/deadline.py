@@ -3,8 +3,6 @@ needs to come. The driver looks at its clock after each outer iteration; an inne
 longer calls `check_time`, and one whose accuracy costs time asks `enough`.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -5,8 +5,6 @@ products do not use BLAS, whose threads would spin until the next call. Source: 
 flexible inner-outer preconditioned GMRES algorithm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

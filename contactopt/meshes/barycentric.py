@@ -1,7 +1,5 @@
 """Where points are beside straight facets: edges in the plane, triangles in space."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ so elements agree and the division ends. Source: Rivara (1984), Algorithms for r
 triangular grids suitable for adaptive and multigrid techniques, Int. J. Numer. Meth. Engng 20.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

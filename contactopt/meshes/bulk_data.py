@@ -9,8 +9,6 @@ a node in a coordinate system of its own. The number of its property names the g
 Source: MSC Nastran, Quick Reference Guide, "Bulk data entries".
 """
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Iterator

@@ -8,8 +8,6 @@ may have boundaries of one name, and 'body:name' is one of them.
 Source: Gmsh reference manual, version 4.15, chapters "Gmsh API" and "Mesh size fields".
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Elements of a mesh: their corners and orientation, straight and curved, and their volumes."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

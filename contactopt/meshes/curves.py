@@ -18,8 +18,6 @@ Aided Geometric Design 13.
 Edges of second order are cut in halves at the nodes within them, which lie on the outline as well.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 

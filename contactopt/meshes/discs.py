@@ -1,7 +1,5 @@
 """Half discs and bodies that rise from them: rings of any radii around a core of squares."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -7,8 +7,6 @@ contactopt.meshes.inp_elements.FACES, counted from another first one.
 Source: L. Schoof and V. Yarberry, EXODUS II: a finite element data model, SAND92-2137.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any

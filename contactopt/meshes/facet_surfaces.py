@@ -16,8 +16,6 @@ Source: Nagata (2005), Simple local interpolation of surfaces using normal vecto
 Geometric Design 22.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The smooth line or surface that a boundary of a mesh stands for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

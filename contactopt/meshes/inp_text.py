@@ -10,8 +10,6 @@ Sources: CalculiX CrunchiX user's manual, version 2.22, chapter "Input deck form
 user's manual, "Input syntax rules".
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import re

@@ -6,8 +6,6 @@ refused otherwise. Source: Frey (2001), MEDIT: an interactive mesh visualization
 technical report 253; libMeshb, list of keywords.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

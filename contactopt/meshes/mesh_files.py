@@ -5,8 +5,6 @@ the body, whichever way round the file writes the facets, and a face between two
 a boundary of each. contactopt.meshes.mesh_repair holds what is repaired and what is refused.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Mapping
 from pathlib import Path

@@ -5,8 +5,6 @@ for every element (Gmsh), sets of elements and of nodes by name (Abaqus), number
 SU2, Nastran). Here all are names; a group without a name has its number as name.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import pickle

@@ -6,8 +6,6 @@ facet lies in one old boundary facet, which gives it its names. New nodes then m
 that the mesh stands for, which `boundary_curves` finds.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace

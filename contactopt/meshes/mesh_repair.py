@@ -1,7 +1,5 @@
 """Faults of meshes from files are repaired, with a line in the log, or refused in a sentence."""
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass, replace
 from itertools import combinations

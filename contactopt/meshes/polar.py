@@ -2,8 +2,6 @@
 evenly around the origin, with elements of second order that bend along circles.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from skfem import MeshQuad, MeshQuad2
 

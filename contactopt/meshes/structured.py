@@ -1,7 +1,5 @@
 """Structured meshes with named boundaries: graded away from the contact, uniform on it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

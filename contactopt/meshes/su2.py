@@ -4,13 +4,12 @@ meshio numbers the names of markers, and may give two of them one number. What i
 refused with its line. Source: SU2, documentation of version 8, "Mesh file".
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from contactopt.cards import count as said
 from contactopt.errors import Damaged, InputError
 from contactopt.meshes.inp_text import text_of
 
@@ -53,7 +52,7 @@ def read_su2(path: Path) -> Any:
                 if not kind or len(nodes) not in (width, width + 1):
                     raise InputError(
                         f"mesh file '{path}', line {at}: elements of type {own} with"
-                        f" {len(nodes)} numbers are not read; save it as .msh or .inp."
+                        f" {said(len(nodes), 'number')} are not read; save it as .msh or .inp."
                     )
                 if key == "MARKER_ELEMS":
                     sets.setdefault(name, {}).setdefault(kind, []).append(len(rows[kind]))

@@ -14,8 +14,6 @@ Sources: Acary, Cadoux, Lemarechal, Malick (2011) for the form with g; Boyd, Par
 Eckstein (2011), Distributed Optimization and Statistical Learning via ADMM.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar

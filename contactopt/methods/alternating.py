@@ -11,8 +11,6 @@ asked for again at tighter settings. The backend `pcg`, for both problems, forms
 active sets and conjugate gradients with the preconditioners of contactopt.methods.preconditioners.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -34,10 +32,7 @@ PCG = "pcg"  # the backend that needs no entry of Q
 
 
 class TwoStage(Method):
-    """The iteration, for any two solvers of the normal and of the tangential problem.
-
-    relaxation  fraction of each new tangential force that is taken, above 0 and at most 1
-    """
+    """The iteration with any two solvers; `relaxation` is the share of new tangential forces."""
 
     relaxation: float
 

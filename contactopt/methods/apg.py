@@ -12,8 +12,6 @@ Sources: O'Donoghue, Candes (2015), Adaptive restart; Acary, Cadoux, Lemarechal,
 formulation of the linear discrete Coulomb friction problem via convex optimization.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import sqrt

@@ -14,8 +14,6 @@ Sources: Alart, Curnier (1991); Simo, Laursen (1992), An augmented Lagrangian tr
 problems involving friction; Rockafellar (1976).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar

@@ -29,8 +29,6 @@ proximal loop.
 It ends where the driver's certificate or limits say so.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Each step solves (I - D + D rho Q) dr = P(r - rho u) - r for every problem that 
 the default method solves. Every answer has the certificate of contactopt.problem.certificate.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,7 +16,6 @@ from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_r
 from contactopt.problem.laws.coulomb import Coulomb
 
 STEPS = 20  # Newton steps, beyond which a problem is left to the default method
-ALL_DIGITS = 1e-13  # residual of the equations, over the forces, at which rounding is left
 RIDGE = 1e-12  # of the mean compliance, for directions without any
 NAME = "Newton's method in a batch"
 
@@ -105,7 +102,7 @@ def _newton(Q: np.ndarray, q: np.ndarray, mu: np.ndarray) -> tuple[np.ndarray, n
         P, D = law.project((at - rho[left, :, None] * u).reshape(-1, dim))
         error = P.reshape(at.shape) - at
         residual, size = np.linalg.norm(error, axis=(1, 2)), np.linalg.norm(at, axis=(1, 2))
-        goes_on = residual > ALL_DIGITS * size
+        goes_on = residual > 1e-13 * size  # else rounding is left
         r[left] = at + error  # within the bounds of the law; the same forces at a solution
         left, at, error, D = left[goes_on], at[goes_on], error[goes_on], D.reshape(-1, k, dim, dim)
         if not len(left):

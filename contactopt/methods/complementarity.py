@@ -15,8 +15,6 @@ Sources: Lemke (1965), Bimatrix equilibrium points; Klarbring (1986), A mathemat
 approach to three-dimensional contact problems with friction; Stewart, Trinkle (1996).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -15,8 +15,6 @@ Source: Acary, Cadoux, Lemarechal, Malick (2011), A formulation of the linear di
 friction problem via convex optimization.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import islice

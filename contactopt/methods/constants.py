@@ -6,8 +6,6 @@ means. Limits and tolerances that follow
 from rounding, from the literature or from a proof stand beside the code that uses them.
 """
 
-from __future__ import annotations
-
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
 # Sweeps at first, and where Newton's method or the first proximal loop has failed; multiplications
 # that they may cost at first (1e6 take about a millisecond).

@@ -11,8 +11,6 @@ may have other minimisers, so that one that slips decides nothing.
 reports/atlas has the smallest problems on which methods fail, with the thresholds observed there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The driver of every method: clock, stopping rule, history, limits, certificate."""
 
-from __future__ import annotations
-
 import logging
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
@@ -14,15 +12,19 @@ from contactopt.checks import check_number
 from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.deadline import TimeUp, until
-from contactopt.linear.operators import (
-    Interface,
-    form,
-    has_entries,
+from contactopt.linear.operators import Interface, form, has_entries
+from contactopt.methods import (
+    NoSolution,
+    Repeated,
+    default_method,
+    exchanged,
+    find_method,
+    solvers_of,
+    solves,
 )
-from contactopt.methods import NoSolution, Repeated, default_method, find_method, solvers_of, solves
 from contactopt.methods.auto import Auto
-from contactopt.methods.exchanged import least_friction
 from contactopt.methods.method import Iterate, Known, Method, at_rest, dimensionless_start
+from contactopt.methods.newton import Newton
 from contactopt.methods.notes import collected, note, remark
 from contactopt.methods.recorder import LEAST_PROOF, Limits, Recorder
 from contactopt.methods.small import solve_small
@@ -44,6 +46,7 @@ CLOSE = 1e-4  # residual up to which a problem that was not solved has a solutio
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
 DOUBT, DEARER = 3, 0.25  # iterates before the proof is first looked for, and more per unknown
 log = logging.getLogger(__name__)
+EXACT, POLISHED = 1e-13, 8  # certificate of forces that surfaces may exchange, and steps to it
 USUAL = Auto()  # which solves every law
 
 
@@ -107,7 +110,9 @@ def solve(
             solution, swept = solve_small(problem, tol, start)
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
-        solution = least_friction(problem, solution, tol)
+        if solution.solved and exchanged.may(problem):
+            finer = replace(limits, tol=EXACT, max_iterations=POLISHED, progress=None)
+            solution = exchanged.least_friction(problem, _polished(problem, solution, finer), tol)
         remark(problem, solution)
     return replace(solution, notes=tuple(notes)) if notes else solution
 
@@ -135,6 +140,20 @@ def _method_for(
             f"these do: {', '.join(solvers_of(problem.law))}."
         )
     return method
+
+
+def _polished(problem: InterfaceProblem, solution: Solution, limits: Limits) -> Solution:
+    """The solution after a few of Newton's steps: forces that the bodies hardly feel need more
+    digits than others.
+    """
+    dear = form(problem.Q) != "array" or problem.contacts > exchanged.FEW
+    if dear or solution.residual <= limits.tol:
+        return solution
+    finer = _run(problem, Newton(), limits, solution, None)
+    if not finer.residual < solution.residual:
+        return solution
+    values = "reactions", "multipliers", "residual", "displacements"
+    return replace(solution, **{name: getattr(finer, name) for name in values})
 
 
 def _run(

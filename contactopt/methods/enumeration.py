@@ -10,8 +10,6 @@ states; it is represented by one of its points. Time grows exponentially with th
 in the worst case.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.checks import check_number

@@ -6,10 +6,7 @@ forces that solve the problem, those with the least friction are given: a corner
 pressure has this pressure, and no friction.
 """
 
-from __future__ import annotations
-
 import logging
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -31,16 +28,38 @@ FEW = 600
 # share of the normal force, and of its friction, that a force may lose and still hold
 INSIDE = 1e-6
 SEEN = 1e-6  # size of the friction of an exchange of size one that has some
-EVEN = 1e-3  # relative difference of pressures that are alike
 EMPTY = np.zeros(0, dtype=int)
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
+# by forces that are hardly felt, and the certificate up to which others may take their place
+HARDLY_FELT, CLEAR = (1e-6, 1e-8), 1e-10
+LAST = 1e-8  # weight of even pressures beside the least friction
+# method of multipliers: what its weight is multiplied by in each of so many rounds, Newton's steps
+# in a round, and the relative size of rounding
+HARDER, ROUNDS, NEWTON, EPS = 10.0, 12, 60, 1e-14
+
+
+def may(problem: InterfaceProblem) -> bool:
+    """Whether contacts are at one place, or contacts of two pairs are neighbours: within three
+    times the largest spacing.
+    """
+    if problem.shared_places:
+        return True
+    points = [problem.coordinates.T[pair.contacts] for pair in problem.pairs]
+    if len(points) < 2 or problem.coordinates.shape[1] != problem.contacts:
+        return False
+    trees = [KDTree(own) for own in points]
+    apart = [tree.query(own, k=[2])[0].ravel() for tree, own in zip(trees, points)]
+    widths = [3 * np.max(d[np.isfinite(d)], initial=0.0) for d in apart]
+    return any(
+        tree.query(own)[0].min() <= max(width, other)
+        for i, (own, width) in enumerate(zip(points, widths))
+        for tree, other in zip(trees[:i], widths)
+    )
 
 
 def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) -> Solution:
     """The solution with the least friction where contacts exchange forces, and a note about it."""
     points, places = problem.coordinates.T, problem.shared_places
-    if not solution.solved or not (places or _meet(problem)):
-        return solution
     known, left, corners = has_entries(problem.Q), [], np.concatenate([*places, EMPTY])
     alone = known  # whether each place is looked at by itself
     if known and problem.contacts <= FEW:
@@ -55,7 +74,8 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
         solution, some = _exchanged(problem, solution, tol, near, at)
         left += [at[0]] * (len(some) > 0)
     said = "the contact forces are not unique: forces that the contacts there exchange change"
-    said += " nothing else"
+    said += " nothing else; pressures and friction there are one choice of several, and may differ"
+    said += " in an equivalent scene"
     # in the plane a corner exchanges forces with contacts nearby alone
     unseen = not known or (problem.contacts > FEW and problem.dim == 3)
     if not left and unseen and places and _rubs(solution.reactions[corners]):
@@ -70,21 +90,6 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
     return solution
 
 
-def _meet(problem: InterfaceProblem) -> bool:
-    """Whether contacts of two pairs are neighbours: within three times the largest spacing."""
-    points = [problem.coordinates.T[pair.contacts] for pair in problem.pairs]
-    if len(points) < 2 or problem.coordinates.shape[1] != problem.contacts:
-        return False
-    trees = [KDTree(own) for own in points]
-    apart = [tree.query(own, k=[2])[0].ravel() for tree, own in zip(trees, points)]
-    widths = [3 * np.max(d[np.isfinite(d)], initial=0.0) for d in apart]
-    return any(
-        tree.query(own)[0].min() <= max(width, other)
-        for i, (own, width) in enumerate(zip(points, widths))
-        for tree, other in zip(trees[:i], widths)
-    )
-
-
 def _most_friction(solution: Solution, at: np.ndarray) -> np.ndarray:
     """The one with the largest friction among some contacts."""
     return at[[np.argmax(np.linalg.norm(solution.reactions[at, 1:], axis=1))]]
@@ -94,86 +99,149 @@ def _exchanged(
     problem: InterfaceProblem, solution: Solution, tol: float, near: np.ndarray, at: np.ndarray
 ) -> tuple[Solution, np.ndarray]:
     """The solution with the least friction that contacts exchange; where some or several stay."""
-    left = EMPTY
-    for contacts in _closed(problem, solution, near):
-        own, unfelt = exchanges(problem, contacts)
-        if not unfelt.size:  # nor do fewer of them exchange any
-            return solution, left
-        r, uneven = _with_least(problem, solution.reactions, own, unfelt)
-        residual = natural_map_residual(problem, r, solution.multipliers)
-        if residual <= max(solution.residual, tol):
-            made = replace(solution, reactions=r, residual=residual)
-            return made, _most_friction(made, at) if _rubs(r[at]) else uneven
-        left = _most_friction(solution, at if len(at) else contacts)
-    return solution, left
+    r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
+    fixed = problem.law.lowest < 0
+    felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())
+    pressed = r[:, 0] > INSIDE * np.abs(r[:, 0]).max()
+    contacts = near[(fixed | pressed | (u[:, 0] <= felt))[near]]
+    own, ways, sizes = exchanges(problem, contacts)
+    unfelt = bool(np.any(sizes <= UNFELT))
+    for least in (*HARDLY_FELT, UNFELT):
+        some = ways[:, sizes <= least]
+        enough = max(solution.residual, tol if least == UNFELT else min(CLEAR, tol))
+        for choose in (_with_least, _within) if some.size else ():
+            chosen, uneven = choose(problem, solution, own, some)
+            residual = natural_map_residual(problem, chosen, solution.multipliers)
+            if residual <= enough:
+                made = replace(solution, reactions=chosen, residual=residual)
+                left = _most_friction(made, at) if _rubs(chosen[at]) else uneven
+                return made, left if unfelt else EMPTY
+    return solution, _most_friction(solution, at if len(at) else contacts) if unfelt else EMPTY
 
 
-def exchanges(problem: InterfaceProblem, contacts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unknowns (m,) of some contacts' forces, and the basis (m, j) of y with Q y = 0, V' y = 0."""
+def exchanges(
+    problem: InterfaceProblem, contacts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unknowns (m,) of some contacts' forces, a basis (m, j) of changes y that the bodies hardly
+    feel, and the relative sizes (j,) of Q y and V' y.
+    """
     Q, dim = problem.Q, problem.dim
     free = np.zeros((problem.contacts, dim), dtype=bool)
     free[contacts, 0], free[contacts, 1:] = True, problem.law.rough[contacts, None]
     own = np.flatnonzero(free.ravel() & ~immovable(problem))
     if not len(own):
-        return own, np.zeros((0, 0))
+        return own, np.zeros((0, 0)), np.zeros(0)
     columns = Q[:, own] if form(Q) == "array" else Q[:, own].toarray()
     motions = problem.V[own] / np.where(problem.reach > 0, problem.reach, 1.0)
     scaled = columns / (np.abs(columns).max() or 1.0)
     felt = np.vstack([scaled, motions.T])
     if not problem.symmetric:
-        return own, _unfelt(felt)
-    # y'Q y <= UNFELT and |V'y|^2 <= UNFELT hold on a space that contains the y looked for and is
-    # found sooner, since the matrix is semidefinite
+        return own, *_shortened(felt, HARDLY_FELT[0])
+    # y'Q y <= HARDLY_FELT and |V'y|^2 <= HARDLY_FELT hold on a space that contains the y looked for
+    # and is found sooner, since the matrix is semidefinite
     sizes, directions = np.linalg.eigh(scaled[own] + motions @ motions.T)
-    some = directions[:, sizes <= UNFELT]
-    return own, some @ _unfelt(felt @ some)
+    some = directions[:, sizes <= HARDLY_FELT[0]]
+    ways, sizes = _shortened(felt @ some, HARDLY_FELT[0])
+    return own, some @ ways, sizes
 
 
-def _unfelt(felt: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of those directions that a matrix shortens to UNFELT or less."""
-    sizes, directions = np.linalg.svd(felt, full_matrices=len(felt) < felt.shape[1])[1:]
-    small = np.pad(sizes, (0, felt.shape[1] - len(sizes))) <= UNFELT
-    return directions[small].T
-
-
-def _closed(problem: InterfaceProblem, solution: Solution, at: np.ndarray) -> Iterator[np.ndarray]:
-    """Contacts of `at` without a gap, then the pressed ones of these, then the sticking ones."""
-    r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
-    bound = problem.law.lowest < 0
-    normal = np.where(bound, np.inf, r[:, 0])
-    closed = (u[:, 0] <= INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())) | bound
-    pressed = normal > INSIDE * np.abs(r[:, 0]).max()
-    inside = np.linalg.norm(r[:, 1:], axis=1) < (1 - INSIDE) * problem.law.bound(r[:, 0])
-    inside = pressed & (inside | ~problem.law.rough)
-    for one, before in ((closed | pressed, None), (pressed, closed | pressed), (inside, pressed)):
-        if before is None or not np.array_equal(one[at], before[at]):
-            yield at[one[at]]
+def _shortened(matrix: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
+    """Orthonormal directions that a matrix shortens to `least` or less, and to what."""
+    sizes, directions = np.linalg.svd(matrix, full_matrices=len(matrix) < matrix.shape[1])[1:]
+    sizes = np.pad(sizes, (0, matrix.shape[1] - len(sizes)))
+    return directions[sizes <= least].T, sizes[sizes <= least]
 
 
 def _with_least(
-    problem: InterfaceProblem, r: np.ndarray, own: np.ndarray, unfelt: np.ndarray
+    problem: InterfaceProblem, solution: Solution, own: np.ndarray, unfelt: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Forces (k, dim) with the least friction among those that are exchanged and, of these, with
     the least sum of pressure times force; and where this sum chose among uneven pressures. Even
     ones are right: what could be added to them is zero in the mean.
     """
+    changed, weight = solution.reactions.ravel().copy(), _weights(problem).ravel()[own]
+    scaled = unfelt * weight[:, None]
+    changed[own] -= unfelt @ np.linalg.lstsq(scaled, changed[own] * weight, rcond=None)[0]
+    chosen = changed.reshape(problem.q.shape)
     tangents = own % problem.dim > 0
-    seen, sizes, ways = np.linalg.svd(unfelt[tangents], full_matrices=True)
-    rank = int(np.sum(sizes > SEEN))
-    changed = r.ravel().copy()
-    friction = seen[:, :rank].T @ changed[own[tangents]]
-    changed[own] -= unfelt @ (ways[:rank].T @ (friction / sizes[:rank]))
-    if rank == len(ways):
-        return changed.reshape(r.shape), EMPTY
-    normal = own[~tangents]
-    weight = 1 / np.sqrt(problem.areas[normal // problem.dim])
-    alone = unfelt[~tangents] @ ways[rank:].T
-    scaled, pressed = alone * weight[:, None], changed[normal] * weight
-    changed[normal] -= alone @ np.linalg.lstsq(scaled, pressed, rcond=None)[0]
-    sizes = np.linalg.norm(scaled, axis=1)
-    pressures = (changed[normal] * weight**2)[sizes > SEEN * sizes.max()]
-    uneven = np.ptp(pressures) > EVEN * np.abs(pressures).max()
-    return changed.reshape(r.shape), normal[[np.argmax(sizes)]] // problem.dim if uneven else EMPTY
+    sizes, ways = np.linalg.svd(unfelt[tangents], full_matrices=True)[1:]
+    alone = scaled[~tangents] @ ways[int(np.sum(sizes > SEEN)) :].T
+    if not alone.size:
+        return chosen, EMPTY
+    normal, sizes = own[~tangents] // problem.dim, np.linalg.norm(alone, axis=1)
+    pressures = (chosen[:, 0] / problem.areas)[normal[sizes > SEEN * sizes.max()]]
+    uneven = np.ptp(pressures) > 1e-3 * np.abs(pressures).max()  # others are alike
+    return chosen, normal[[np.argmax(sizes)]] if uneven else EMPTY
+
+
+def _weights(problem: InterfaceProblem) -> np.ndarray:
+    """(k, dim) roots of the weights of squared forces in the sum that is least."""
+    weight = np.ones(problem.q.shape)
+    weight[:, 0] = np.sqrt(LAST * problem.areas.mean() / problem.areas)
+    return weight
+
+
+def _within(
+    problem: InterfaceProblem, solution: Solution, own: np.ndarray, unfelt: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same where the law bounds the choice, and no place: the least of a convex function over
+    the forces that obey the law with the displacements of the solution, by the method of
+    multipliers with Newton's steps.
+    """
+    dim, size = problem.dim, np.abs(solution.reactions).max()
+    contacts, place = np.unique(own // dim, return_inverse=True)
+    law, given = problem.law.select(contacts), solution.reactions[contacts]
+    ways = np.zeros((*given.shape, unfelt.shape[1]))
+    ways[place, own % dim] = unfelt
+    ways = ways @ _allowed(problem, solution, contacts, ways)
+    flat, weight = ways.reshape(given.size, -1), _weights(problem)[contacts].ravel()
+    scaled = flat * weight[:, None]
+    square = scaled.T @ scaled
+    z, pull, stiff = np.zeros(flat.shape[1]), np.zeros_like(given), HARDER
+    for _ in range(ROUNDS):
+        least = np.inf
+        for _ in range(NEWTON):
+            r = given + ways @ z
+            y = r + pull / stiff
+            inside, slope = law.nearest_derivative(y, r[:, 0])
+            off, left = y - inside, weight * r.ravel()
+            value = left @ left + stiff * np.vdot(off, off)
+            if value < least * (1 - EPS):
+                least, kept = value, (z, stiff * off)
+                bent = (ways - slope @ ways).reshape(given.size, -1)
+                bent = square + stiff * flat.T @ bent
+                step = -np.linalg.solve(bent, scaled.T @ left + flat.T @ kept[1].ravel())
+            elif np.abs(step).max(initial=0.0) <= EPS * size:
+                break
+            else:
+                step = step / 2
+            z = kept[0] + step
+        z, pull, stiff = *kept, stiff * HARDER
+        r = given + ways @ z
+        if np.abs(r - law.nearest(r, r[:, 0])).max() <= EPS * size:
+            break
+    changed = solution.reactions.copy()
+    changed[contacts] = r
+    return changed, EMPTY
+
+
+def _allowed(
+    problem: InterfaceProblem, solution: Solution, contacts: np.ndarray, ways: np.ndarray
+) -> np.ndarray:
+    """Combinations of changes (k, dim, j) that keep the force of each sliding contact on its ray,
+    and are zero at open ones.
+    """
+    u = problem.displacements(solution.reactions, solution.multipliers)
+    felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())
+    u = u[contacts]
+    u[np.abs(u[:, 0]) <= felt, 0] = 0.0
+    u[np.linalg.norm(u[:, 1:], axis=1) <= felt, 1:] = 0.0
+    moved, size = np.linalg.norm(u, axis=1), np.abs(solution.reactions).max()
+    y = solution.reactions[contacts] - size * u / np.where(moved > 0, moved, 1.0)[:, None]
+    y[:, 0] += INSIDE * size  # a contact without force that slips has a ray, too
+    slope = problem.law.select(contacts).project(y)[1]
+    slope[moved == 0] = np.eye(problem.dim)
+    return _shortened((ways - slope @ ways).reshape(y.size, -1), UNFELT)[0]
 
 
 def _rubs(r: np.ndarray) -> bool:

@@ -12,8 +12,6 @@ Sources: Glowinski, Lions, Tremolieres (1981), Numerical Analysis of Variational
 Uzawa's method; Panagiotopoulos (1975) for the alternation.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

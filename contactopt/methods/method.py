@@ -1,7 +1,5 @@
 """What every method offers: it yields one iterate after the other, and says what it needs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Protocol
 

@@ -11,8 +11,6 @@ multi-level multi-summation and conjugate gradient techniques; Hueber, Stadler, 
 the active sets; Eisenstat, Walker (1996) for the accuracy of steps.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -12,8 +12,6 @@ Sources: Alart, Curnier (1991); Hueber, Stadler, Wohlmuth (2008), A primal-dual 
 for three-dimensional contact problems with Coulomb friction.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -96,9 +94,7 @@ class Newton(Method):
 
 
 class Contacts:
-    """Newton's method on the equations of the contacts, by factors of an array or a sparse Q, or by
-    products with Q to the accuracy that a step is worth.
-    """
+    """Newton's method on the contacts' equations, by factors of Q or by products with Q."""
 
     def __init__(self, problem: InterfaceProblem, preconditioner: str | None, by_products: bool):
         self.problem, self.equations = problem, coulomb_equations(problem)

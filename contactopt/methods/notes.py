@@ -3,8 +3,6 @@ sentence. The driver opens `collected` around each solve, whose Solution keeps t
 threads.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -13,8 +13,6 @@ Source: Jourdan, Alart, Jean (1998), A Gauss-Seidel like algorithm to solve fric
 problems.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot, inf
@@ -31,7 +29,6 @@ from contactopt.problem import InterfaceProblem
 from contactopt.problem.cones import disc
 from contactopt.problem.laws.law import Law
 
-ROOT = 1e-14  # relative accuracy of the local slip problem
 STEPS = 60  # Newton or bisection steps for it
 
 
@@ -147,7 +144,7 @@ class Local:
             size, normal = hypot(t1, t2), press - w1 * t1 - w2 * t2
             way = -1.0 if self.bilateral and normal < 0 else 1.0
             excess = size - mu * way * normal
-            if (level == 0.0 and excess <= 0) or abs(excess) <= ROOT * size:
+            if (level == 0.0 and excess <= 0) or abs(excess) <= 1e-14 * size:
                 break
             low, high = (level, high) if excess > 0 else (low, level)
             # derivatives by level

@@ -15,8 +15,6 @@ Sources: Kikuchi, Oden (1988), Contact Problems in Elasticity, chapter 6; Wrigge
 Computational Contact Mechanics.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar

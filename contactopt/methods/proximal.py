@@ -10,8 +10,6 @@ multiplier form of the same loop is the augmented Lagrangian method with penalty
 Sources: Acary, Bremond, Huber (2018), section on proximal-point algorithms; Rockafellar (1976).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Literal

@@ -1,7 +1,5 @@
 """What a solve keeps of its iterates: history, certificate, best answer, and when it ends."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

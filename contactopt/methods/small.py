@@ -4,8 +4,6 @@ need no scaling. What they do not solve goes on as without them, and so does eve
 package was installed without a compiler.
 """
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
@@ -67,9 +65,7 @@ def certified(
     tol: float,
     r: np.ndarray | None = None,
 ) -> tuple[float, np.ndarray]:
-    """The certificate after at most so many sweeps from forces r (k, dim), infinite where they do
-    not converge, and their forces. `look` is how many of them are worth a certificate of their own.
-    """
+    """The certificate after sweeps from r (k, dim), infinite if they diverge, and their forces."""
     dim, arrays = given
     r = np.zeros(arrays[-1].shape) if r is None else np.array(r, float, order="C")
     numbers = constants.NEARLY_SWEPT, constants.SWEPT, look, tol

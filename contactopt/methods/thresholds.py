@@ -47,8 +47,6 @@ convergence near this solution, exact unless a contact is between two states; gl
 other solutions and the solution's change of state with mu are not covered: a heuristic there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +57,6 @@ from contactopt.problem.contact_status import contact_status
 
 # an eigenvalue with relatively less imaginary part is real; a smaller one is rounding
 REAL, ZERO = 1e-7, 1e-10
-DEFINITE = 1e-10  # least eigenvalue of a definite matrix, over the largest entry
 
 
 @dataclass(frozen=True)
@@ -113,9 +110,7 @@ def _parts(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
 def thresholds(
     problem: InterfaceProblem, shape: np.ndarray, energy: bool
 ) -> tuple[Thresholds, Thresholds, bool]:
-    """The guaranteed thresholds of a dimensionless problem with coefficients mu * `shape`, those
-    at which uniform slip fails, and whether both are the same. `energy`: Q is symmetric.
-    """
+    """Guaranteed thresholds of mu * `shape`, those of uniform slip, and whether both agree."""
     low, high = Thresholds(0.0, 0.0, 0.0), _uniform_slip(problem, shape)
     if not energy:
         high = Thresholds(high.unique, np.nan, np.nan)
@@ -169,7 +164,7 @@ def _guaranteed(problem: InterfaceProblem, shape: np.ndarray, energy: bool) -> T
 def check_definite(A: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """A, if its symmetric part is definite far above another's rounding, else LinAlgError."""
     least = np.inf if not A.size else la.eigvalsh((A + A.T) / 2, subset_by_index=(0, 0))[0]
-    if least <= DEFINITE * np.abs(beside).max(initial=0.0):
+    if least <= 1e-10 * np.abs(beside).max(initial=0.0):  # not above rounding
         raise la.LinAlgError("not definite")
     return A
 

@@ -13,8 +13,6 @@ Sources: Panagiotopoulos (1975); Haslinger, Dostal, Kucera (2002), On a splittin
 the numerical realization of contact problems with Coulomb friction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

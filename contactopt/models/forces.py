@@ -1,7 +1,5 @@
 """The programs in forces, the dual form, and the choice between the two forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import cvxpy as cp

@@ -10,8 +10,6 @@ mu |u_t|. With `facets` |u_t| is the largest of -c . u_t over the corners c of t
 InputError if the compliance is singular, because displacements do not determine forces then.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import cvxpy as cp

@@ -1,7 +1,5 @@
 """A convex program with names, and the parts that the programs of both forms share."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The program of limit analysis: the factors on a load that friction may balance."""
 
-from __future__ import annotations
-
 import cvxpy as cp
 import numpy as np
 

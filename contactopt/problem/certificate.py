@@ -49,8 +49,6 @@ differ much have displacements that differ little (`amplification` says how much
 all units, and costs one product with Q.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -67,13 +65,11 @@ ACTS = 1e-6  # share of the largest force from which on a contact's displacement
 # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
 ROUNDED = 1e-6
 DUST = 1e-5  # share of the force that closes the gaps below which forces are rounding
-UNFELT = 1e-12  # share of the largest displacement below which a motion moves no contact that holds
 # rounding of r - rho u, over r, and how many times F the forces are from where on it counts
 ROUNDING, UNSEEN = 2.0**-52, 1e4
 # share of a gap, or of the largest motion, up to which what motions leave of a gap is none: they
 # are known to the rounding of the few equations that give them
 CANCELLED = 16 * ROUNDING
-STIFFEST = 1e4  # largest rho_i, over the mean one
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +180,7 @@ def yardsticks(
     force = force or 1.0  # no force, and none that would make a displacement: any number serves
     if length == 0:
         return Yardsticks(force, 0.0, np.zeros(len(r)))
-    stiff = np.minimum(np.maximum(mean * problem.stiffnesses, 1.0), STIFFEST)
+    stiff = np.minimum(np.maximum(mean * problem.stiffnesses, 1.0), 1e4)  # times the mean rho
     return Yardsticks(force, length, stiff * (force / length))
 
 
@@ -247,7 +243,7 @@ def amplification(
     reach = np.where(problem.reach > 0, problem.reach, 1.0)
     V, size = problem.V / reach, np.maximum(np.abs(problem.s) / reach / measure.force, 1.0)
     _, felt, motions = la.svd(rows @ V, full_matrices=False)
-    Z = motions[felt > UNFELT * felt.max(initial=0.0)].T
+    Z = motions[felt > 1e-12 * felt.max(initial=0.0)].T  # the rest moves nothing held
     scale, n = measure.length / measure.force, k * dim
     M = np.block(
         [

@@ -6,8 +6,6 @@ A function that ends in `_derivative` gives the nearest points and the generalis
 projection.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 DIRECTIONS = 16  # of the polygon in a disc
@@ -70,10 +68,7 @@ def half_line_derivative(
 
 
 def disc_derivative(y: np.ndarray, radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Projection of y (k, d) on discs |y| <= radius, and its generalised derivative (k, d, d).
-
-    Outside the disc the derivative is (radius / |y|) (I - y y' / |y|^2), which is zero for d = 1.
-    """
+    """Projection of y (k, d) on discs |y| <= radius, and its generalised derivative (k, d, d)."""
     k, d = y.shape
     if d == 1:
         bound = np.broadcast_to(radius, (k,))[:, None]

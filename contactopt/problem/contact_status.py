@@ -1,7 +1,5 @@
 """Open, sticking and slipping contacts, as the law of the problem tells them apart."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -13,8 +13,6 @@ made exact by a least-squares step, and checked in floating point on its own. So
 for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 

@@ -43,9 +43,6 @@ from contactopt.problem.cones import lengths
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.law import Law
 
-# largest |Q - Q'|, over the largest |Q|, that counts as rounding of the code that wrote Q
-SYMMETRIC = 1e-2
-TOGETHER = 1e-9  # of the extent of all contacts: those that are nearer lie at one place
 GENERIC = np.sqrt([1.0, 2.0, 3.0])  # a direction that no lattice of contacts repeats
 
 
@@ -194,7 +191,7 @@ class InterfaceProblem:
     @cached_property
     def symmetric(self) -> bool:
         """Whether Q is symmetric to 1 %, as methods that minimise an energy need it."""
-        return asymmetry(self.Q) <= SYMMETRIC
+        return asymmetry(self.Q) <= 1e-2  # rounding of the code that wrote Q
 
     @cached_property
     def fingerprint(self) -> str:
@@ -234,7 +231,7 @@ class InterfaceProblem:
         x = self.coordinates
         if x.shape[1] != self.contacts or self.contacts < 2 or self.pairs[0].name == UNNAMED:
             return []
-        near = TOGETHER * (x.max(axis=1) - x.min(axis=1)).max()
+        near = 1e-9 * (x.max(axis=1) - x.min(axis=1)).max()  # of the extent: one place
         line = GENERIC[: len(x)] @ x  # no two points of a grid fall together
         line.sort()
         if (line[1:] - line[:-1]).min() > GENERIC.sum() * near:

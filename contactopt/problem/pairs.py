@@ -1,8 +1,4 @@
-"""One pair of surfaces of an interface problem, taken alone: places on a contact surface mean
-something within one pair only.
-"""
-
-from __future__ import annotations
+"""One pair of surfaces of an interface problem, taken alone."""
 
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The form in which methods work: without units, with friction the same in all directions."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Warm starts along sequences of meshes: reactions of one problem as a first guess for another."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -14,8 +14,6 @@ own.
 Source: Farkas' lemma for cones; Boyd, Vandenberghe (2004), Convex Optimization, section 5.9.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +28,7 @@ from contactopt.problem.scaling import isotropic, without_rounding
 
 # work of the largest load over a motion's displacements from which on the motion counts
 SURE = 1e-6
-BALANCED = 1e-10  # relative error of a balance that counts as exact
 FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
-TURNING = 1e-3  # least displacement by a rotation, over the largest, of a body that tips over
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +79,7 @@ def _described(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> 
     body = max(work, key=lambda owner: work[owner])
     size = np.abs(motion) * np.array([owner == body for owner in owners])
     turns = size * np.array(["rotation" in name for name in problem.motions] or np.zeros(len(s)))
-    if opens and turns.max() > TURNING * size.max():
+    if opens and turns.max() > 1e-3 * size.max():  # it tips over
         size = turns
     return Escape(motion, int(np.argmax(size)), opens, bool(still))
 
@@ -149,7 +145,7 @@ def _balanced(problem: InterfaceProblem, s: np.ndarray, given: np.ndarray) -> bo
     bound = problem.mu * normal + np.where(np.isinf(given) & ~shut, 0.0, given)
     held = np.all(normal >= 0) and np.all(np.linalg.norm(r[:, 1:], axis=1) <= bound)
     left = np.linalg.norm(problem.V.T @ even + s)
-    return bool(held and left <= BALANCED * np.linalg.norm(s))
+    return bool(held and left <= 1e-10 * np.linalg.norm(s))  # counts as exact
 
 
 def _search(

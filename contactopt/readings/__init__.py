@@ -1,3 +1,1 @@
-"""What is read off a solved scene: edges, peaks, resultants, stresses at places, fields on the
-surfaces.
-"""
+"""What is read off a solved scene: edges, peaks, resultants, stresses and fields."""

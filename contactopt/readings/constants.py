@@ -40,7 +40,8 @@ ROUGH = 1e-6  # certificate asked of a coarse mesh: its own error is larger
 BALANCED = 1e-8
 # what it may bear where it gets no less; beyond, the body bends by itself and needs no ground
 BEARABLE = 1e-4
-ROUNDS = 12  # of problems with the ground
+BORNE = 1e-12  # what it may bear in the end, where rounds still take load off it
+ROUNDS = 24  # of problems with the ground
 SLOW = 0.7  # share of the last round's imbalance from which on a round is of no use
 
 # Refinement (contactopt.accuracy).

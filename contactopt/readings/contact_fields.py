@@ -1,8 +1,4 @@
-"""Contact quantities as fields: on the surface of every pair, and on the nodes of the bodies, as
-VTU files.
-"""
-
-from __future__ import annotations
+"""Contact quantities as fields on the surface of every pair and on the nodes of the bodies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -163,9 +159,7 @@ def _nodes(reduction: Reduction, name: str, places: np.ndarray) -> dict[str, np.
 def on_nodes(
     reduction: Reduction, fields: tuple[Fields, ...], surfaces: tuple[ContactFields, ...]
 ) -> tuple[Fields, ...]:
-    """Put the contact quantities on the nodes of the contact surfaces, each that of the nearest
-    contact, zero elsewhere. Traction and slip of a lower body have the opposite sign.
-    """
+    """Put contact quantities on the nodes of surfaces, with the sign of each body; else zero."""
     default = {part.name: getattr(part, "contact", None) for part in reduction.scene.parts}
     made = []
     for body in fields:

@@ -11,8 +11,6 @@ corners of plates in extension; Dundurs, Lee (1972), Stress concentration at a s
 problems, Journal of Elasticity 2.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from skfem import Mesh
 

@@ -21,8 +21,6 @@ zone nearer to a rectangle than to an ellipse, half of the side of the square wi
 Where an end cannot be read, the nodal areas are counted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -52,7 +50,6 @@ from contactopt.readings.patches import End, is_round, patches_of
 from contactopt.readings.peaks import Peak, Reading, neighbours
 from contactopt.scenes.scene import Scene
 
-LEVEL = 0.9  # least cosine between normals of a zone in space and their mean that has a half-width
 Read = tuple[float, float]  # a distance and its uncertainty
 Reader = Callable[[End], Read | None]
 
@@ -72,14 +69,12 @@ def contact_area(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray)
 
 
 def is_level(problem: InterfaceProblem, frames: np.ndarray, reactions: np.ndarray) -> bool:
-    """Whether a zone of contact on a surface in space has a half-width: where it bends around a
-    body, as in a press fit, its area alone has a meaning. `frames` (k, dim, dim) are the contacts'.
-    """
+    """Whether a zone in space has a half-width: not where it bends around a body."""
     normals = frames[contact_status(problem, reactions).touching, 0]
     if problem.dim == 2 or not len(normals):
         return True
     mean = normals.mean(axis=0)
-    return bool(np.min(normals @ mean) > LEVEL * np.linalg.norm(mean))
+    return bool(np.min(normals @ mean) > 0.9 * np.linalg.norm(mean))  # least cosine with the mean
 
 
 def _is_ring(scene: Scene, problem: InterfaceProblem) -> bool:
@@ -191,9 +186,7 @@ def _half_width(
     read: Reader,
     least: float,
 ) -> tuple[float, float]:
-    """Half-width of the zone `inside`, from the readings of its ends, and its uncertainty, at least
-    `least` elements. `weights` (k,) average the centre of a zone on a surface.
-    """
+    """Half-width of the zone `inside` from readings of its ends, and its uncertainty."""
     area, counted = float(problem.areas[inside].sum()), _counted(scene, problem, inside)
     if ring := _is_ring(scene, problem):  # half of the width of the ring, along its section
         around = 2 * np.pi * np.abs(problem.coordinates[0])

@@ -1,7 +1,5 @@
 """What is asked of solved half-spaces: real contact area, pressures, stiffness, slip, maps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +11,6 @@ from contactopt.errors import InputError
 from contactopt.linear.operators import block
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
-
-STIFFNESS = 1e-8  # relative accuracy of a stiffness
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +61,7 @@ def surface_contact(problem: InterfaceProblem, solution: Solution) -> SurfaceCon
 def pressure_distribution(
     problem: InterfaceProblem, solution: Solution, bins: int = 50
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The distribution of the pressure over the real contact area: the edges (bins + 1,) of the
-    intervals [stress], and the density (bins,) [1 / stress], whose integral is one.
-    """
+    """Edges [stress] and density [1 / stress] of the pressure over the real contact area."""
     touching = contact_status(problem, solution.reactions).touching
     pressure = solution.reactions[touching, 0] / problem.areas[touching]
     density, edges = np.histogram(pressure, bins, weights=problem.areas[touching], density=True)
@@ -88,7 +82,7 @@ def contact_stiffness(problem: InterfaceProblem, solution: Solution) -> np.ndarr
     motions = np.tile(np.eye(problem.dim), (problem.contacts, 1))[rows]
     system = LinearOperator(Q.shape, matvec=lambda x: Q @ x, dtype=float)
     most = 10 * len(rows)
-    forces = [cg(system, m, rtol=STIFFNESS, maxiter=most)[0] for m in motions.T]
+    forces = [cg(system, m, rtol=1e-8, maxiter=most)[0] for m in motions.T]
     return np.asarray(motions.T @ np.stack(forces, axis=1))
 
 

@@ -7,8 +7,6 @@ curvatures. The force of each pair is the one that balances the loads, where one
 each of these places can do that. Source: Johnson (1985), Contact Mechanics, sections 4.1 and 4.2.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +18,6 @@ from contactopt.scenes.scene import Scene
 NEAREST = {2: 5, 3: 16}  # contacts that are fitted, by the dimension
 ROUND, LONG = 1.001, 1e4  # ratios of curvatures between which a contact is an ellipse
 COARSEST, WANTED = 4.0, 8.0  # elements along the smallest half-width: too few, and enough
-MOST_FACES = 20_000  # on a surface: where more would be needed, elements grow from a point
 BALANCED = 1e-3  # share of the loads that the forces of the pairs may leave
 
 
@@ -51,7 +48,7 @@ class Hertz(NamedTuple):
         widths = " and ".join(f"{width:.3g}" for width in self.widths)
         wanted = self.widths[-1] / WANTED
         place = ",".join(f"{x:.6g}" for x in np.round(self.place, 9) + 0.0)
-        many = area > MOST_FACES * wanted ** (len(self.place) - 1)
+        many = area > 20_000 * wanted ** (len(self.place) - 1)  # else they grow from a point
         fine = f"{place}:{wanted / 2:.2g}" if many else f"{face}:{wanted:.2g}"
         return [
             f"  Hertz predicts half-widths of {widths} {length} under a force of {self.force:.4g};"

@@ -15,8 +15,6 @@ and w one on the unknowns that are held: its slope by U is A w. The displacement
 the adjoint, since w - C A w is the smooth motion of the body under a unit motion of its holder.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial, reduce
 from typing import TypeAlias

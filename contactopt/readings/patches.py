@@ -6,8 +6,6 @@ disc about its centre, seen as one end, or an ellipse: lengths along its axes ar
 becomes the disc of the same area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,8 +18,6 @@ from contactopt.readings.constants import RING, ROUNDNESS
 
 # distances that differ by less than this fraction of an element belong to one ring of nodes
 SAME = 1e-5
-# between 1, of a disc, and 1.25, of a square: the farthest point over that of a disc
-FARTHEST = 1.12
 
 # rings of nodes next to the edge: how many are left out, how many are fitted
 Window = tuple[int, int]
@@ -172,9 +168,7 @@ def least(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> list[Patch]:
-    """The connected patches of a zone `inside` (k,), in their order along a contact line. On a
-    surface one disc about its mean place by `weights` (k,), or none where it is no disc.
-    """
+    """The connected patches of a zone along a line in order, on a surface one disc or none."""
     if problem.dim == 3:
         disc = _disc(problem, inside, weights)
         return [] if disc is None else [disc]
@@ -231,14 +225,12 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
 
 
 def is_round(problem: InterfaceProblem, inside: np.ndarray) -> bool:
-    """Whether a zone on a surface is nearer to an ellipse than to a rectangle: scaled to equal
-    axes, the first reaches as far as the disc of its area, the second 1.25 times as far.
-    """
+    """Whether a zone on a surface, scaled to equal axes, is more an ellipse than a rectangle."""
     areas = problem.areas
     x = _from_centre(problem, inside, areas)
     scaled, _ = _as_disc(problem, x, inside, areas)
     disc = np.sqrt(areas[inside].sum() / np.pi)
-    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= FARTHEST * disc)
+    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= 1.12 * disc)  # a disc has 1
 
 
 def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> np.ndarray:

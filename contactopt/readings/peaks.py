@@ -5,8 +5,6 @@ meshes: the value at a peak comes from a fit through several nodes, weighted by 
 Every reading says how uncertain it is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 

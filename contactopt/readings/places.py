@@ -41,9 +41,6 @@ if TYPE_CHECKING:
     from contactopt.bodies.stress_recovery import StressMap
 
 LARGEST = "von_mises"
-# how far beyond the coordinates of a body a point may lie before anything is solved, over its size
-OUTSIDE = 0.05
-DEVIATIONS = 2  # standard errors of a fit that a stress may be off: 95 of 100 are within two
 RIVAL = 0.5  # of the largest scatter, which the places need that are to be looked at more closely
 AROUND = {2: 9, 3: 17}  # vertices among which a local maximum is the largest, itself among them
 NEAREST = {2: 4, 3: 8}  # contacts through which the pressure near a place is fitted
@@ -131,9 +128,7 @@ def check_meshed(name: str, body: str, scene: Scene) -> None:
 
 
 def check_there(name: str, part: Part, region: Region, scene: Scene, meeting: bool = False) -> None:
-    """InputError for a boundary that the body's first mesh lacks, and for a point far outside. As
-    in Support, 'a/b' may be where the boundaries a and b meet, if that is allowed.
-    """
+    """InputError for a boundary that the body's first mesh lacks, or a point far outside."""
     from contactopt.meshes.cells import straight
 
     mesh = part.build_mesh(scene.elements, scene.zone)
@@ -160,7 +155,7 @@ def check_there(name: str, part: Part, region: Region, scene: Scene, meeting: bo
     if region.point:
         corners = straight(mesh).p
         low, high = corners.min(axis=1), corners.max(axis=1)
-        slack = OUTSIDE * (high - low).max() + (region.radius or 0.0)
+        slack = 0.05 * (high - low).max() + (region.radius or 0.0)  # of the body's size
         if np.any(region.point < low - slack) or np.any(region.point > high + slack):
             raise InputError(
                 f"quantity {name!r}: the point ({_words(region)}) lies outside body"
@@ -194,10 +189,7 @@ def _around(name: str, where: str, scene: Scene) -> Region:
 def read_stress(
     place: Place, reduction: Reduction, displaced: tuple[np.ndarray, ...]
 ) -> StressReading:
-    """Read the stress that a quantity names from the displacements U (n,) of all bodies [length].
-
-    InputError for a boundary that the body does not have, and a point outside the body.
-    """
+    """Read the stress that a quantity names; InputError for a missing boundary or point."""
     from contactopt.bodies.fields import von_mises, von_mises_slopes
 
     number, recovered = _map_of(place, reduction)
@@ -214,7 +206,7 @@ def read_stress(
         sizes, slopes, tops = stress[:, column], np.zeros(stress.shape), []
         slopes[:, column] = 1.0
     top = int(np.argmax(sizes))
-    scatter = DEVIATIONS * recovered.deviation(U, slopes)
+    scatter = 2 * recovered.deviation(U, slopes)  # standard errors hold 95 of 100
     above = sizes + scatter - sizes[top]
     doubtful = (above > 0) & (scatter >= RIVAL * scatter[above > 0].max(initial=0.0))
     slopes[np.arange(len(slopes)) != top] = 0.0
@@ -243,9 +235,7 @@ def _map_of(place: Place, reduction: Reduction, by_poisson: bool = False) -> tup
 
 
 def place_seeds(place: Place, state: State) -> Seeds:
-    """The slopes of a quantity at a place. A stress is a function of the displacement U of its
-    body, which free motions do not strain; a largest one is differentiated where it is.
-    """
+    """The slopes of a quantity at a place; a largest stress is differentiated where it is."""
     if place.kind == "pressure":
         return Functional(pressure_weights(place, state.reduction))(state)
     found = read_stress(place, state.reduction, state.displaced)

@@ -22,8 +22,6 @@ from contactopt.problem import Solution
 if TYPE_CHECKING:
     from contactopt.scenes.matrix_part import AnyPart
 
-TINY = 1e-15  # share of the extent of the contacts below which a motion is rounding
-
 
 class Motion(NamedTuple):
     """How far the upper bodies move beyond the lower ones along a mean direction [length], and by
@@ -56,7 +54,7 @@ def motion(reduction: Reduction, displaced: Sequence[Any], component: int) -> Mo
             out[c] = float(body.carried(int(c))[0] @ U)
     value, size = float(np.sum(weights * moved)), float(np.abs(weights * moved).sum())
     extent = float(np.ptp(reduction.problem.coordinates, axis=1).max(initial=0.0))
-    rounding = max(ROUNDED * size, TINY * extent)
+    rounding = max(ROUNDED * size, 1e-15 * extent)
     return Motion(value if abs(value) > rounding else 0.0, weights)
 
 

@@ -2,8 +2,6 @@
 bodies that are misplaced, loads on a surface that may touch. `check` and `run` say the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import combinations
@@ -22,8 +20,6 @@ from contactopt.scenes.scene import Part, Scene
 # of the extent of a surface, up to which a closed gap is small, however fine its facets are
 SHARE = 0.02
 STIFFEST, SOFTEST = 1.3e12, 1e2  # Young's moduli [Pa]: above that of diamond, below that of gels
-FAINT = 1e-9  # stress of a load over Young's modulus: no load on a solid strains it less
-LARGER = 300.0  # ratio of sizes: metres beside millimetres, of bodies up to three times as large
 
 UNPUSHED = (
     "nothing pushes the bodies: there is no load, no displacement of a support and no overlap;"
@@ -130,7 +126,7 @@ def _faint_loads(scene: Scene, part: Part) -> list[str]:
             own = largest / (area * depth * scene.copies) if load.total else largest
             stress = max(stress, own)
     strain = stress / part.material.E
-    if not 0 < strain < FAINT:
+    if not 0 < strain < 1e-9:  # no load on a solid strains it less
         return []
     return [
         f"the loads strain body '{part.name}' by about {strain:.0e} only: are its loads and"
@@ -196,7 +192,7 @@ def _sizes(scene: Scene) -> list[str]:
     for names in combinations(size, 2):
         small, large = sorted(names, key=lambda name: size[name])
         ratio = size[large] / size[small]
-        if ratio > LARGER:
+        if ratio > 300.0:  # metres beside millimetres
             notes.append(
                 f"body '{large}' is {ratio:.4g} times as large as '{small}': are both given in the"
                 " unit of length of the scene?"

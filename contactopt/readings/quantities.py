@@ -21,8 +21,6 @@ ROWS has one row for each. What it makes, a Quantity, is all that is known of it
 errors, gradients, fits and the command line know of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -135,9 +133,7 @@ def elastic_energy(reduction: Reduction, solution: Solution) -> float:
 def _of_pair(
     read: Reader, slopes: Callable[[State, int], Seeds]
 ) -> Callable[[str, str, Scene], Quantity]:
-    """A row whose quantity is read from the forces on one pair of surfaces; of the pressure also
-    that at one contact, by its number.
-    """
+    """A row whose quantity is read from the forces on one pair, of pressure also at a contact."""
 
     def make(name: str, rest: str, scene: Scene) -> Quantity:
         if read is pressure_reading and rest.isdigit():
@@ -229,10 +225,14 @@ def _motion(state: State, component: int) -> Seeds:
     found = None
     if approach(reduction, state.solution) is not None or component == 1:
         found = motion(reduction, state.displaced, component)
-    if found is None or not len(state.solution.multipliers):
+    plates = len(state.solution.multipliers)
+    if found is None or not plates:
+        why = (
+            "its surfaces go around a body and have no mean normal" if plates else "it has no plate"
+        )
         raise InputError(
-            f"scene '{reduction.scene.name}' has no plate, hence no approach and no shift, or"
-            " surfaces around a body, which have no mean normal; ask for another quantity."
+            f"scene '{reduction.scene.name}' has no {'shift' if component else 'approach'}, since"
+            f" {why}; ask for another quantity."
         )
     by_r, by_motions, by_U = np.zeros(state.problem.q.shape), [], []
     for body, B, weights in zip(reduction.bodies, reduction.maps, sign * found.weights):

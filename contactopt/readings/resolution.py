@@ -1,8 +1,4 @@
-"""Whether the mesh resolves the contact at all: remarks for people, on answers whose certificate
-says nothing of the mesh.
-"""
-
-from __future__ import annotations
+"""Whether the mesh resolves the contact, of which the certificate says nothing: remarks."""
 
 import numpy as np
 
@@ -19,14 +15,10 @@ FEWEST = 4
 # of the median traction, between neighbours on a tie that is joined more than once: right forces on
 # a few coarse seams jumped by about 0.3, and alternating ones by 2 and more
 JUMP = 1.0
-APART = 0.05  # relative difference of two readings of the largest pressure that is told
 
 
 def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
-    """Sentences on couplings that do not transmit a constant pressure; for certified solutions also
-    on ties whose forces jump, and on zones that end by themselves and are smaller than FEWEST
-    elements.
-    """
+    """Sentences on couplings without constant pressure, jumping ties, and zones that are small."""
     coupled = tuple(text for made in reduction.couplings for text in made.remarks)
     if not solution.solved:
         return coupled
@@ -39,9 +31,7 @@ def remarks(reduction: Reduction, solution: Solution) -> tuple[str, ...]:
 
 
 def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
-    """Sentences on ties that could give up no contact where others join their bodies too, and whose
-    forces jump there: between two contacts of a cell by more than JUMP of the median traction.
-    """
+    """Sentences on ties whose forces jump by more than JUMP of the median traction."""
     if all(made.tight is None for made in reduction.couplings):
         return []
     problem, found = reduction.problem, []
@@ -67,9 +57,7 @@ def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
 
 
 def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
-    """The pairs of surfaces whose zone of contact is smaller than the mesh can show: name and
-    number of contacts of each, with the numbers of those that touch.
-    """
+    """Name, number of contacts and touching ones of pairs whose zone the mesh cannot show."""
     found = []
     for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):
         problem = view.problem
@@ -83,7 +71,7 @@ def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, in
 
 def smoothed(peak: Reading, largest: float) -> list[str]:
     """One sentence where the largest pressure at a node is not the one that is read around it."""
-    if abs(largest - peak.value) <= APART * abs(largest):
+    if abs(largest - peak.value) <= 0.05 * abs(largest):  # two readings agree
         return []
     return [
         f"the largest pressure at a node is {largest:.4g}, and its"

@@ -1,8 +1,4 @@
-"""Resultant forces and moments of every pair of surfaces, support and plate, in the coordinates of
-space.
-"""
-
-from __future__ import annotations
+"""Resultant forces and moments of every pair, support and plate, in coordinates of space."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -34,9 +30,7 @@ class Resultant:
 
 
 def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> Resultant:
-    """The resultant of nodal forces (dim, m) at points (dim, m), with all mirror images, or of
-    whole rings (r and z): images balance each other but along planes and axis.
-    """
+    """The resultant of nodal forces (dim, m) at points, with mirror images, or of rings."""
     if reduction.scene.analysis.revolved:
         return Resultant(np.array([0.0, forces[1].sum()]), np.zeros(1))
     for plane in reduction.planes:

@@ -5,8 +5,6 @@ of a half-width by the force at each closed contact are central differences of t
 solve nothing; what the parameters do to the forces is exact.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

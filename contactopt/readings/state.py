@@ -1,7 +1,5 @@
 """A solved state, and a function of it with its derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property

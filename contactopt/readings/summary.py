@@ -1,7 +1,5 @@
 """What is known of an answer, as the numbers and remarks of summary.json."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any

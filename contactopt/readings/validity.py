@@ -5,8 +5,6 @@ bounds of the table below is computed from the displacements of the bodies alone
 factors that made the interface problem.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -39,9 +37,7 @@ UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facet
 
 
 def overlap_share(reduction: Reduction, solution: Solution) -> float:
-    """By which share the areas of surfaces that overlap as drawn differ, the mean weighted by
-    forces [-]: small displacements do not tell on which of the two a pressure acts.
-    """
+    """By which share the areas of surfaces that overlap as drawn differ, weighted by forces."""
     shares = np.zeros(len(solution.reactions))
     ring = reduction.scene.kind == "axisymmetric"
     for pair, made in zip(reduction.problem.pairs, reduction.couplings):
@@ -78,9 +74,7 @@ def _sizes(cells: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], list[str]]:
-    """Measure how far an answer goes beyond what is assumed: the tables `bodies` and `pairs` of a
-    summary, by the keys of BOUNDS, and one sentence for every value beyond its bound.
-    """
+    """Measure how far an answer exceeds the assumptions: tables of a summary, and sentences."""
     displaced, reactions = reduction.displaced(solution), solution.reactions.ravel()
     bodies: dict[str, dict[str, float]] = {}
     remarks: list[str] = []

@@ -6,8 +6,6 @@ functions below, and only there. A load path is a tuple of scenes that differ in
 contactopt.follow() solves it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from inspect import Parameter, signature

@@ -2,8 +2,6 @@
 of stones.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from itertools import pairwise
 from typing import Any

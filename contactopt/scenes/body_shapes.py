@@ -1,7 +1,5 @@
 """The mesh of a body in a scene file: from a mesh file, or a block, a ring or a disc."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Which surfaces of which bodies may touch, and under which law."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +26,7 @@ class Contact:
     mu            what the law reads: the friction coefficient, for 'tresca' a bound of the
                   tangential traction [stress]; a number >= 0, one per contact (k,), or a function
                   of the contacts' positions (dim, k) that gives either; for 'orthotropic' two
-                  coefficients instead of one; left out for a law without friction
+                  coefficients instead of one; a law without friction ignores it: leave it out
     law           a name in contactopt.problem.laws.LAWS
     coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits
                   the surfaces

@@ -2,8 +2,6 @@
 0.4)'.
 """
 
-from __future__ import annotations
-
 import ast
 import operator
 from collections.abc import Callable, Mapping

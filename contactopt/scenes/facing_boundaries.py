@@ -5,8 +5,6 @@ one of them, projected along the normal of the other, lies inside the other and 
 than a distance. So facets that lie beside each other do not, and overlaps count as gaps do.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

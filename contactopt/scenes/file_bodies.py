@@ -1,7 +1,5 @@
 """The bodies of a scene file: what each is made of, what holds and loads it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Half-spaces in scene files, and their surfaces: flat, an expression, measured, or generated."""
 
-from __future__ import annotations
-
 import io
 import re
 from pathlib import Path
@@ -145,10 +143,7 @@ def _numbers(table: Table, path: Path) -> np.ndarray:
 
 
 def _between(
-    table: Table,
-    values: np.ndarray,
-    sides: list[tuple[float, float]],
-    counts: tuple[int, ...],
+    table: Table, values: np.ndarray, sides: list[tuple[float, float]], counts: tuple[int, ...]
 ) -> np.ndarray:
     """Heights at the points of the grid, linear between measured places (n, dim), height."""
     from scipy.interpolate import griddata

@@ -1,7 +1,5 @@
 """Flat punches: the paper's block on a foundation, and a rigid punch on a half-space."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

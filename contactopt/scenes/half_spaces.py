@@ -2,8 +2,6 @@
 and sheared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

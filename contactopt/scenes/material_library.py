@@ -2,8 +2,6 @@
 write.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

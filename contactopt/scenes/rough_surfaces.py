@@ -1,7 +1,5 @@
 """Self-affine rough surfaces, made from a seed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

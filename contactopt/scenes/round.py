@@ -2,8 +2,6 @@
 load.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any
 
@@ -20,13 +18,7 @@ from contactopt.analytic import (
 from contactopt.checks import check_count, check_positive
 from contactopt.errors import InputError
 from contactopt.material import Material
-from contactopt.meshes.structured import (
-    graded,
-    half_sphere_section,
-    patch,
-    rename,
-    tensor_mesh,
-)
+from contactopt.meshes.structured import graded, half_sphere_section, patch, rename, tensor_mesh
 from contactopt.scenes.common import (
     GROWTH,
     MARGIN,

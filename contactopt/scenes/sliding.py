@@ -2,8 +2,6 @@
 fro.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 
@@ -187,10 +185,7 @@ def _block(
 
 
 def _towards_edges(stick: float, half_width: float, elements: int, growth: float) -> np.ndarray:
-    """Grid of the candidate contact nodes, finer at the edges of stick and contact, where the
-    tractions are steep: half_width / elements elsewhere. A stick zone too small for that has no
-    grading of its own.
-    """
+    """Grid of candidate contacts, finer at the edges of stick and contact."""
     largest = half_width / elements
 
     def fine_end(length: float) -> np.ndarray:

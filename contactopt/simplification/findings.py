@@ -1,7 +1,5 @@
 """What may be left out of a scene, as a report with the simplified scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

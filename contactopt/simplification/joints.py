@@ -6,8 +6,6 @@ assumption holds in the end is read from the solution of the simplified scene, b
 a tied pair say whether it would have opened or slipped.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -5,8 +5,6 @@ The plane lies in the middle between the outermost nodes, across an axis of spac
 principal axis of the nodes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

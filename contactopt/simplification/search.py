@@ -1,7 +1,5 @@
 """The search through all kinds of simplification, the exact ones first."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

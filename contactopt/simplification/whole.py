@@ -1,7 +1,5 @@
 """A scene with the meshes of its bodies: how large it is, and where its gaps and friction act."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property

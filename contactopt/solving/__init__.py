@@ -1,8 +1,4 @@
-"""One place solves a scene (solve_scene); the contact zone, the load path and several meshes are
-loops around it.
-"""
-
-from __future__ import annotations
+"""One place solves a scene (solve_scene); zone, load path and several meshes are loops."""
 
 from collections.abc import Sequence
 
@@ -19,9 +15,7 @@ def solve_states(
     options: Options | None = None,
     start: Solved | None = None,
 ) -> Solved:
-    """Solve a scene on meshes fitted to its contact zone from `start`, the scene solved on another
-    mesh, or follow a load path on one mesh. InputError as from solve_zone() and follow().
-    """
+    """Solve a scene on fitted meshes from `start`, or follow a load path on one mesh."""
     if len(states) == 1:
         return solve_zone(states[0], elements, options, start)
     own = options or Options()

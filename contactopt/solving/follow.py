@@ -1,8 +1,4 @@
-"""Follow a load path: one state after the other, on the bodies, coupling and Q of the first
-(contactopt.solving.paths).
-"""
-
-from __future__ import annotations
+"""Follow a load path: one state after the other, on bodies, coupling and Q of the first."""
 
 from collections.abc import Callable, Iterable, Sized
 from dataclasses import replace
@@ -129,9 +125,7 @@ def _ended(now: Solved, states: list[State], named: str) -> Solution:
 def state_of(
     solved: Solved, before: State | None = None, last: Forces | None = None
 ) -> tuple[State, Forces]:
-    """What is kept of a state, and for each body its displacements U and the external forces F on
-    it, given what this function returned for the state before; nothing for the first one.
-    """
+    """What is kept of a state, and U and external forces F of each body, from the last one's."""
     reduction, solution = solved.reduction, solved.solution
     problem, r = reduction.problem, solution.reactions
     gap, earlier = np.zeros(r.shape), np.zeros(r.shape)

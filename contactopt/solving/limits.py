@@ -1,8 +1,4 @@
-"""Bounds on what a search for an accuracy may take, and the sentences that say which of them ended
-it.
-"""
-
-from __future__ import annotations
+"""Bounds on a search for an accuracy, and the sentences that say which of them ended it."""
 
 from dataclasses import dataclass
 

@@ -19,8 +19,6 @@ step in energy: second order in its size, zero where neither contact nor the dir
 slip change.
 """
 
-from __future__ import annotations
-
 import csv
 from collections import Counter
 from collections.abc import Mapping

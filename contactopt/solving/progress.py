@@ -1,8 +1,4 @@
-"""One line per outer iteration of a solve that takes long: what it has reached, what it took, what
-is left.
-"""
-
-from __future__ import annotations
+"""One line per outer iteration of a long solve: what it reached, what it took, what is left."""
 
 import math
 import resource
@@ -19,10 +15,7 @@ from contactopt.screen import PATIENCE
 def progress_lines(
     say: Callable[[str], None], problem: InterfaceProblem, tol: float
 ) -> Callable[[int, float], None]:
-    """A function for the `progress` of contactopt.solve that says a line for each outer iteration,
-    from PATIENCE seconds on: residual, V-cycles, time, memory, and the time left until the residual
-    is tol if it goes on falling as it fell last.
-    """
+    """A function that says one line per outer iteration, from PATIENCE seconds on."""
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []
     bodies = problem.Q.coupled if form(problem.Q) == "bodies" else None

@@ -6,8 +6,6 @@ above the tolerance the state is solved. Therefore a scene may be changed in bet
 some pair of surfaces has kept its name.
 """
 
-from __future__ import annotations
-
 import time
 import zipfile
 from collections.abc import Callable, Sequence
@@ -27,7 +25,6 @@ from contactopt.problem.transfer import transfer
 FILE = "restart.npz"
 START = "start"  # the method of a solution that another run has found
 PATIENCE = 5.0  # seconds between two writings of the file, at least
-SHARE = 20.0  # of the time at most one part in so many is spent on writing
 Point = tuple[np.ndarray, np.ndarray]  # reactions (k, dim) [force], multipliers (p,) [length]
 
 
@@ -181,7 +178,7 @@ class Restart:
         if self.file is not None and begin - self.written > self.pause:
             replace_file(self.file, self.save)
             self.written = time.perf_counter()
-            self.pause = max(PATIENCE, SHARE * (self.written - begin))
+            self.pause = max(PATIENCE, 20.0 * (self.written - begin))  # a twentieth of the time
 
     def finished(self, solution: Solution) -> None:
         """The present state is solved."""
@@ -229,9 +226,7 @@ def make_restart(
     path: bool,
     note: Callable[[str], None],
 ) -> Restart:
-    """What keeps the states of a run in the folder `out`, with those that it resumes there, or of
-    the run in `start`; `path`: whether it has a load path. `note` is told where there are none.
-    """
+    """What keeps the states of a run in `out`, and resumes those there or of the run `start`."""
     file = None if out is None else Path(out) / FILE
     if not resume:
         return Restart(file, None if start is None else read_known(start), path)

@@ -1,7 +1,5 @@
 """Whether a state that was not solved slides: friction cannot bear its load, whatever sticks."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +9,6 @@ from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.problem.unbalanced_loads import escape
 from contactopt.scenes.scene import Scene
-
-NEAR = 0.9  # share of what friction bears from which on a state without a sticking contact slides
 
 
 class Sliding(NamedTuple):
@@ -49,7 +45,7 @@ def sliding(problem: InterfaceProblem, ended: Solution, before: Solution | None)
         load = np.abs(problem.s + r_n @ V[:, 0])
         slips = not contact_status(problem, ended.reactions).stick.any()
         worst = int(np.argmax(load - most))
-        if load[worst] > (NEAR if slips else 1.0) * most[worst] > 0:
+        if load[worst] > (0.9 if slips else 1.0) * most[worst] > 0:  # of what friction bears
             name = problem.motions[worst] if problem.motions else f"motion {worst + 1}"
             held = float(most[worst]) if own is before else np.nan
             found = found or Sliding(name, float(load[worst]), held)
@@ -74,9 +70,7 @@ def unheld_words(
     last: tuple[Solution, np.ndarray],
     names: tuple[str, str],
 ) -> str:
-    """One sentence on a state that is known to have no solution, by the sentence on its load, after
-    a solved state, of which the solution and the resultants s are given. `names` are of both.
-    """
+    """One sentence on a state without a solution, after a solved state, by that on its load."""
     (solution, held), (state, before) = last, names
     if slid := sliding(problem, solution, solution):
         return sliding_words(slid, scene, state, before)

@@ -4,8 +4,6 @@ Whatever solves scenes is a loop around the two functions of this module: the co
 paths (contactopt.solving), and refinement (contactopt.accuracy).
 """
 
-from __future__ import annotations
-
 import logging
 import time
 from collections import Counter
@@ -27,7 +25,16 @@ from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.transfer import transfer
-from contactopt.readings.constants import BALANCED, BEARABLE, COARSEST, FACTOR, ROUGH, ROUNDS, SLOW
+from contactopt.readings.constants import (
+    BALANCED,
+    BEARABLE,
+    BORNE,
+    COARSEST,
+    FACTOR,
+    ROUGH,
+    ROUNDS,
+    SLOW,
+)
 from contactopt.readings.validity import validity
 from contactopt.scenes.scene import Scene
 from contactopt.solving.paths import PathResult
@@ -144,9 +151,7 @@ def solve_scene(
         return solved
     solution = solved.solution
     solution = replace(
-        solution,
-        seconds=solution.seconds | {"given up": gone},
-        notes=(*solution.notes, *notes),
+        solution, seconds=solution.seconds | {"given up": gone}, notes=(*solution.notes, *notes)
     )
     return replace(solved, solution=solution, turned=turned)
 
@@ -273,7 +278,7 @@ def _on_ground(
     seconds = Counter(solution.seconds)
     for _ in range(ROUNDS):
         left = _doubt(held, solution)
-        if left <= BALANCED or left > SLOW * before or not solution.solved:
+        if left <= BORNE or left > SLOW * before or not solution.solved:
             break
         held, before = held.pulled(solution), left
         solution = answer(held.problem, solution)

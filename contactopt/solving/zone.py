@@ -1,8 +1,4 @@
-"""The loop that remeshes a scene until its contact zone ends at a node of the mesh (paper, 3 and
-4.2).
-"""
-
-from __future__ import annotations
+"""The loop that remeshes a scene until its contact zone ends at a node (paper, 3 and 4.2)."""
 
 from collections import Counter
 from dataclasses import replace

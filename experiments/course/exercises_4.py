@@ -81,8 +81,9 @@ def proves(motion: np.ndarray) -> str | None:
         return (
             f"This motion pushes a corner into the floor: corners move by {left:.3g}, {right:.3g}."
         )
-    if -10 * (up + 2.45 * turn) <= 1e-6 * size:
-        return f"The load does the work {-10 * (up + 2.45 * turn):.3g}, which is not positive."
+    work = -10 * (up + 2.45 * turn) + 0.0  # no -0
+    if work <= 1e-6 * size:
+        return f"The load does the work {work:.3g}, which is not positive."
     return None
 
 

@@ -235,6 +235,7 @@ def draw_recipes(rows: list[Row]) -> Any:
     ax.axhspan(min(mesh), max(mesh), color=GREY, alpha=0.3, lw=0)
     ax.text(0.1, max(mesh) * 0.85, "error of the mesh", color=GREY, fontsize=LETTERS, va="top")
     ax.axhline(0.01, color=GREY, lw=0.6, ls=":")
+    ax.text(100, 0.011, "1 %", color=GREY, fontsize=LETTERS, ha="right", va="bottom")
     ax.set_xticks(list(RECIPES), ["0.1 E/h", "E/h", "10 E/h", "100 E/h"])
     ax.minorticks_off()
     ax.set(xlabel="penalty factor", ylabel="relative error [-]")
@@ -287,23 +288,29 @@ def draw_times(rows: list[Row]) -> Any:
     figure, (ax,) = paper_axes()
     own = [row for row in rows if row["elements"] == MESHES[-1]]
     colours = {"penalty": ORANGE, "augmented Lagrangian": BLUE, "Newton on multipliers": GREEN}
+    named = {"penalty": (0.01, 1.0, 100.0), "augmented Lagrangian": (0.01, 0.1)}  # factors
     for row in own:
-        colour = colours.get(row["method"], GREY)
-        good = row["end"] == "solved"
-        y = max(float(row["error"]), 1e-12)
-        ax.loglog(row["cpu"], y, "o" if good else "x", color=colour, ms=4)
-        if row["method"] in ("lagrangian", "Uzawa"):
-            label, side = row["method"], {"xytext": (4, 0), "textcoords": "offset points"}
-            ax.annotate(label, (row["cpu"], y), color=colour, fontsize=LETTERS, va="center", **side)
-        elif row["E/h times"] in (0.01, 0.1, 1.0, 100.0, 1e4):
-            text = f"{row['E/h times']:g}"
-            side = {"xytext": (4, 0), "textcoords": "offset points"}
-            ax.annotate(
-                text, (row["cpu"], y), color=colour, fontsize=LETTERS - 1, va="center", **side
-            )
-    for number, (name, colour) in enumerate(colours.items()):
-        ax.text(0.98, 0.98 - 0.08 * number, name, color=colour, fontsize=LETTERS, ha="right",
-                va="top", transform=ax.transAxes)  # fmt: skip
+        row["drawn"] = max(float(row["error"]), 1e-12)
+    for name, colour in colours.items():
+        x, y = np.array([(r["cpu"], r["drawn"]) for r in own if r["method"] == name]).T
+        ax.loglog(x, y, "o-", color=colour, ms=4, lw=0.8)
+    for row in own:
+        colour, good = colours.get(row["method"], GREY), row["end"] == "solved"
+        name = row["method"]
+        if name in ("lagrangian", "Uzawa"):
+            ax.loglog(row["cpu"], row["drawn"], "o" if good else "x", color=GREY, ms=4)
+        if name in named:
+            if row["E/h times"] not in named[name]:
+                continue
+            name = f"{row['E/h times']:g} E/h"
+        way = -1 if colour == BLUE else 1  # of the label
+        side = {"xytext": (4 * way, 3), "textcoords": "offset points", "annotation_clip": False}
+        side["ha"] = "right" if way < 0 else "left"
+        ax.annotate(name, (row["cpu"], row["drawn"]), color=colour, fontsize=LETTERS - 1, **side)
+    ax.text(0.98, 0.97, "penalty", color=ORANGE, transform=ax.transAxes, ha="right", va="top",
+            fontsize=LETTERS)  # fmt: skip
+    ax.text(0.98, 0.89, "augmented Lagrangian", color=BLUE, transform=ax.transAxes, ha="right",
+            va="top", fontsize=LETTERS)  # fmt: skip
     ax.set(xlabel="CPU time [s]", ylabel="error of the forces [-]")
     return figure
 

@@ -1,7 +1,5 @@
 """A body on an elastic half-plane, without a mesh."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from contactopt.problem import InterfaceProblem

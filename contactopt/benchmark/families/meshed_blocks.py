@@ -1,7 +1,5 @@
 """Elastic blocks in the plane that stand on each other, with meshes that do not match."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Problems of the named scenes, and problems made from them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

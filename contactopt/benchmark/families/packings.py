@@ -6,8 +6,6 @@ gap / step, H the contact velocities of the bodies' velocities. More contact com
 freedom: W is sparse and of deficient rank.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
@@ -44,12 +42,7 @@ def packing(
 
 
 def parts_of_packing(
-    dim: int,
-    bodies: int,
-    seed: int,
-    points: int = 1,
-    disorder: float = 0.3,
-    spin: float = 0.0,
+    dim: int, bodies: int, seed: int, points: int = 1, disorder: float = 0.3, spin: float = 0.0
 ) -> tuple[sp.csr_array, np.ndarray, np.ndarray, np.ndarray]:
     """W, contact velocities (m, dim) that gravity makes in the step, random ones, and gaps (m,)."""
     if dim not in (2, 3) or bodies < 2**dim or points < 1:

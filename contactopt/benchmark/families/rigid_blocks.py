@@ -6,8 +6,6 @@ each, which two (in space four) would describe: with more of them, and in walls,
 redundant, and W is singular.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

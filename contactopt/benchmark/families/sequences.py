@@ -2,8 +2,6 @@
 one structure. A state may depend on the answer to the last one, which is computed here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ to the right, and weak springs to its neighbours. Without neighbours its solutio
 loads below mu = 2/3; above, loads in a sector have three.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg as la
 

@@ -3,8 +3,6 @@
 Each of them has a ray that proves it, which `contactopt.problem.infeasibility` finds and checks.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

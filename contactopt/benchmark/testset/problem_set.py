@@ -1,7 +1,5 @@
 """Sets of problems: a TOML file of rows, and what was computed of them in a JSON file beside it."""
 
-from __future__ import annotations
-
 import json
 import operator
 import re

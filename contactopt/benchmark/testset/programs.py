@@ -18,8 +18,6 @@ npz, as qpsolvers.Problem.save and qpbenchmark write it; CBF, the Conic Benchmar
 (https://cblib.zib.de), in which t >= x' P x / 2 is the rotated cone (t, 1, F x) with F' F = P.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,8 +29,6 @@ import scipy.sparse as sp
 from contactopt.errors import InputError
 from contactopt.files.writing import whole_file
 from contactopt.problem import InterfaceProblem
-
-NULL = 1e-14  # share of the largest eigenvalue of P below which one counts as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +145,7 @@ def write_cbf(program: ConvexProgram, path: Path) -> None:
     """Write the program, with t >= x' P x / 2 as the last unknown, in version 1 of CBF."""
     n, bounded = len(program.c), np.flatnonzero(np.isfinite(program.lower))
     w, U = la.eigh(program.P)
-    kept = w > NULL * np.abs(w).max(initial=0.0)
+    kept = w > 1e-14 * np.abs(w).max(initial=0.0)  # the others count as zero
     F = np.sqrt(w[kept])[:, None] * U[:, kept].T
     unit = sp.eye_array(n, format="csr")
     wide = program.T.shape[1] + 1

@@ -2,8 +2,6 @@
 one that was made on another machine is known again.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ A solver is a class in a module of its own and a line of SOLVERS. It is made fro
 contactopt.bodies.solvers.system.System.
 """
 
-from __future__ import annotations
-
 import logging
 from importlib import import_module
 from importlib.util import find_spec

@@ -4,8 +4,6 @@ it.
 None of them changes what a solver converges to. They change only how long it takes.
 """
 
-from __future__ import annotations
-
 # `python -m experiments.questions.body_solvers` measures time and memory of every solver over the
 # number of unknowns of a 3D body.
 PARDISO_FROM = 5_000  # unknowns of a body from which PARDISO is faster, its library loaded or not

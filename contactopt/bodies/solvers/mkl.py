@@ -1,7 +1,5 @@
 """Where oneMKL is, which pypardiso installs."""
 
-from __future__ import annotations
-
 import os
 from functools import cache
 from importlib.metadata import PackageNotFoundError, files

@@ -15,8 +15,6 @@ Sources: Vanek, Mandel, Brezina (1996), Algebraic multigrid by smoothed aggregat
 fourth order elliptic problems; Lottes (2023), Optimal polynomial smoothers for multigrid V-cycles.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from threading import Lock
 from typing import NamedTuple
@@ -294,9 +292,7 @@ def _starts(A: sp.bsr_matrix, chosen: np.ndarray) -> np.ndarray:
 
 
 def rigid_motions(points: np.ndarray) -> np.ndarray:
-    """The translations and rotations of points (dim, k) as columns, (k dim, 3) in 2D and (k dim, 6)
-    in 3D, the near-kernel of the stiffness, hoop strain apart.
-    """
+    """The translations and rotations of points (dim, k) as columns, (k dim, 3 or 6)."""
     fields = rigid_fields(points)
     return fields.swapaxes(0, 1).reshape(-1, fields.shape[2])
 
@@ -314,9 +310,7 @@ def _largest_eigenvalue(A: SparseProduct) -> float:
 def nodal_blocks(
     A: sp.csr_matrix | Submatrix, node: np.ndarray, component: np.ndarray, dim: int
 ) -> tuple[sp.bsr_matrix, np.ndarray, np.ndarray]:
-    """A matrix in single precision and blocks of the k nodes present, held unknowns as rows of
-    their own; each unknown's place (n,) in it; the nodes (k,).
-    """
+    """A matrix in single precision and blocks of k nodes, the places (n,) in it, the nodes (k,)."""
     present, own = np.unique(node, return_inverse=True)
     place, size = own * dim + component, len(present) * dim
     held = np.full(size, np.median(A.diagonal()))
@@ -333,9 +327,7 @@ def nodal_blocks(
 
 
 def _masked(whole: sp.bsr_matrix, present: np.ndarray, held: np.ndarray) -> sp.bsr_matrix:
-    """The blocks of the nodes present (k,) of a matrix in blocks of all nodes, where unknowns have
-    rows of their own whose diagonal entry is given, and not zero.
-    """
+    """The blocks of the nodes present (k,), where unknowns may have rows of their own."""
     dim = whole.blocksize[0]
     there = np.zeros(whole.shape[0] // dim, dtype=bool)
     there[present] = True

@@ -10,8 +10,6 @@ Sources: George (1973), Nested dissection of a regular finite element mesh, SIAM
 Trans. Math. Softw. 11, 141-153.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

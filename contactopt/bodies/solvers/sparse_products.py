@@ -6,8 +6,6 @@ oneMKL's functions are called here rather than through the package sparse_dot_mk
 package makes a new handle of the matrix for each product.
 """
 
-from __future__ import annotations
-
 import ctypes
 import weakref
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Sparse factors by SuperLU, and how to use no more of them than a load reaches."""
 
-from __future__ import annotations
-
 import weakref
 from _thread import start_new_thread
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """The linear system of one elastic body: what its solvers are made from and what they all offer."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

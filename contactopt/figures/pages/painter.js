@@ -169,10 +169,13 @@ class Painter {
     }
   }
 
-  bar(words, {table, low, high, names}, y) {  // of the colours, with ticks
-    const {context} = this, wide = this.width / this.dense, length = Math.min(0.88 * wide, names ? 130 * names.length : 480), left = (wide - length) / 2;
-    for (let i = 0; i < length; i++) { const n = 3 * Math.floor((255 * i) / length); context.fillStyle = `rgb(${table[n]},${table[n + 1]},${table[n + 2]})`; context.fillRect(left + i, y, 1.5, 10); }
+  bar(words, {table, low, high, names, shown = names?.map((_, i) => i)}, y) {  // of the colours, with ticks, or with the names of those shown
+    const {context} = this, wide = this.width / this.dense, length = Math.min(0.88 * wide, names ? 130 * shown.length : 480), left = (wide - length) / 2;
+    for (let i = 0; i < length; i++) {
+      const n = 3 * Math.floor(255 * (names ? (shown[Math.floor((shown.length * i) / length)] + 0.5) / names.length : i / length)); context.fillStyle = `rgb(${table[n]},${table[n + 1]},${table[n + 2]})`; context.fillRect(left + i, y, 1.5, 10);
+    }
     this.text(words, wide / 2, y - 9);
-    for (const value of names ? names.keys() : ticks(low, high, length > 400 ? 6 : 4)) this.text(names ? names[value] : short(value), left + (length * (value - low)) / (high - low), y + 19);
+    if (names) shown.forEach((value, i) => this.text(names[value], left + (length * (i + 0.5)) / shown.length, y + 19));
+    else for (const value of ticks(low, high, length > 400 ? 6 : 4)) this.text(short(value), left + (length * (value - low)) / (high - low), y + 19);
   }
 }

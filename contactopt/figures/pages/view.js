@@ -140,7 +140,7 @@ function bodyColours() {
 }
 
 function contactColours() {
-  if (now.contact === "role") return {table: TABLES.role, low: -0.5, high: data.roles.length - 0.5, names: data.roles};
+  if (now.contact === "role") return {table: TABLES.role, low: -0.5, high: data.roles.length - 0.5, names: data.roles, shown: [...new Set(contacts.filter((pair) => pair.shown).map((pair) => state(pair, "role")[0]))].sort((a, b) => a - b)};
   if (now.contact === "status") return {table: TABLES.status, low: -0.5, high: 2.5, names: STATUS};
   const [low, high] = span(contacts.filter((pair) => pair.shown).map((pair) => pair.states[now.contact]));
   return {table: TABLES.contact, low: now.contact === "gap" ? low : Math.min(low, 0), high};
@@ -199,7 +199,7 @@ function arrows(pair) {  // the largest force of each square
       if (!(best.get(key)?.size >= size)) best.set(key, {size, foot, way: [0, 1, 2].map((c) => (image.some(([axis]) => axis === c) ? -1 : 1) * force[3 * i + c])});
     }
   });
-  const [right, up] = painter.axes, longest = ((data.words ? 0.08 : 0.13) * Math.min(view.clientWidth, view.clientHeight)) / largest, along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const [right, up] = painter.axes, longest = reach() / largest, along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   for (const {size, foot, way} of best.values()) if (size > 0.01 * largest) painter.arrow(foot, [longest * along(way, right), -longest * along(way, up)]);
 }
 
@@ -207,12 +207,14 @@ function room() {  // left, right, top and bottom of the picture between the col
   return [flat ? 64 : 20, view.clientWidth - 20, contacts.length ? 62 : 20, view.clientHeight - (bodies.length ? 56 : 8) - (flat ? 34 : 14)];
 }
 
+const reach = () => (data.words ? 0.08 : 0.13) * Math.min(view.clientWidth, view.clientHeight);  // length of the longest arrow
+
 function aim() {  // turns the model, and makes the box fit
   const {angle, height} = now, [c, s, h, v] = [Math.cos(angle), Math.sin(angle), Math.cos(height), Math.sin(height)];
   const axes = flat ? [[1, 0, 0], [0, 1, 0], [0, 0, 1]] : [[-s, c, 0], [-c * v, -s * v, h], [c * h, s * h, v]];
-  const [low, high] = now.box, [left, right, top, bottom] = room();
+  const [low, high] = now.box, [left, right, top, bottom] = room(), rim = data.words ? 2 * reach() : 0;  // for the arrows of loads
   const [wide, tall] = axes.map((way) => low.reduce((sum, value, i) => sum + Math.abs(way[i]) * (high[i] - value), 0));
-  const scale = (0.94 * now.zoom) / Math.max(wide / (right - left), tall / (bottom - top), 1e-300);
+  const scale = (0.94 * now.zoom) / Math.max(wide / (right - left - rim), tall / (bottom - top - rim), 1e-300);
   painter.look(axes, low.map((value, i) => (value + high[i]) / 2 + now.shift[i]), scale, [(left + right) / 2, (top + bottom) / 2]);
 }
 

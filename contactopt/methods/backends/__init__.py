@@ -21,7 +21,6 @@ from contactopt.errors import InputError
 from contactopt.linear.deadline import TimeUp, check_time, time_left
 
 Answer = tuple[np.ndarray, np.ndarray]  # what a bridge returns: forces, multipliers
-FIRST = 10  # iterations of the first try of a backend whose iterations are its only limit
 TIGHT = 1e-9  # accuracy asked of every backend, in dimensionless units
 
 
@@ -60,7 +59,7 @@ class Backend:
         if not self.steps or not isfinite(time_left()):
             yield self.timed()
             return
-        most, count = self.settings[self.steps], FIRST
+        most, count = self.settings[self.steps], 10
         while True:
             check_time()
             begin = perf_counter()

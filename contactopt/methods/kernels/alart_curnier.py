@@ -5,8 +5,6 @@ r = P(r - rho (Q r + V lambda + q)),  V' r + s = 0,  P the map of the law (conta
                                       `project`)
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -32,8 +30,6 @@ from contactopt.methods.method import Iterate
 from contactopt.problem import InterfaceProblem
 
 GLUE = 1e-8  # added to Q for the bonded solution, which a Q of deficient rank leaves open
-
-LEAST_REACH = 1e-12  # of a multiplier's column of V, which is dimensionless
 
 
 def coulomb_equations(
@@ -79,9 +75,7 @@ def definite(Q: np.ndarray | sp.csr_array) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Sticking:
-    """Steps through the bonded system of elastic bodies that a plate presses together, while few
-    contacts are open or slip; else by `others`.
-    """
+    """Steps through the bonded system of pressed elastic bodies while few contacts differ."""
 
     bonded: Bonded
     others: Factored
@@ -146,7 +140,7 @@ def glued_contacts(problem: InterfaceProblem) -> np.ndarray:
     closed = np.asarray((problem.law.lowest < 0) | (gap < 0))
     if not len(problem.s):
         return closed
-    reach = np.maximum(np.abs(problem.V).max(axis=0, initial=0.0), LEAST_REACH)
+    reach = np.maximum(np.abs(problem.V).max(axis=0, initial=0.0), 1e-12)  # V is dimensionless
     force = float(np.sum(np.abs(problem.s) / reach))
     indented = gap + diagonal(problem.Q).reshape(problem.q.shape)[:, 0] * force
     pairs = [slice(pair.start, pair.stop) for pair in problem.pairs]

@@ -7,8 +7,6 @@ from contact to contact, as at a weighted median, and only the exact search find
 sticks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -19,12 +17,8 @@ from contactopt.problem.cones import disc_derivative
 from contactopt.problem.laws.law import Law
 
 LEAST_FELT = 1e-8  # share of a motion that closed, sticking or glued contacts must feel to hold it
-DIRECT = 5  # steps of Newton's method that are tried without softened friction
 SURE = 1e-6  # error of the balance, over all friction bounds, with which a motion counts as found
 STEPS = 50  # of Newton's method
-# by how much friction grows faster with the slip from one convex problem to the next
-SHARPER = 100.0
-EXACT = 1e-13  # relative error of the balance at which the search ends
 # relative to V'V, added to the Newton matrix: nothing need be in contact at the start
 CURVATURE = 1e-10
 
@@ -55,7 +49,7 @@ def project_balanced(
         check_time()
         P, D = project(z)
         error = V.T @ P.ravel() + s
-        if np.all(np.abs(error) <= EXACT * size):
+        if np.all(np.abs(error) <= 1e-13 * size):  # of the balance
             break
         # lambda minimises a convex function with the gradient -(V'P + s) and the second derivative
         # V' rho D V.
@@ -143,12 +137,12 @@ def settled(
         P, moved = project_balanced(_softened(bound, share), t, W, s, rho, moved, steps)
         return moved, bool(np.linalg.norm(W.T @ P.ravel() + s) <= SURE * bound.sum())
 
-    moved, found = balanced(np.zeros(len(s)), 1.0, DIRECT)
+    moved, found = balanced(np.zeros(len(s)), 1.0, 5)  # steps without softened friction
     if not found:  # far away the friction must soften first
         share = float(np.min(bound / np.maximum(np.linalg.norm(t, axis=1), bound), initial=1.0))
         moved = np.zeros(len(s))
         while share < 1.0:
-            moved, share = balanced(moved, share)[0], SHARPER * share
+            moved, share = balanced(moved, share)[0], 100.0 * share  # times sharper friction
         moved, found = balanced(moved, 1.0)
     return loose @ moved if found else None
 

@@ -11,8 +11,6 @@ costs `dim` columns of G once, 2 n^2 operations each. The bonded solution, the c
 Newton's method, comes with it.
 """
 
-from __future__ import annotations
-
 import weakref
 
 import numpy as np

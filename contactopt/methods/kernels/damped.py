@@ -1,7 +1,5 @@
 """Newton's method with a line search, for proximal subproblems."""
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np

@@ -7,8 +7,6 @@ Sci. Comput. 17, 538-559; Hwang, Su, Cai (2015), A parallel adaptive nonlinear e
 preconditioned inexact Newton method for transonic full potential equation.
 """
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np

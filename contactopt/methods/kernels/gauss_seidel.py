@@ -9,8 +9,6 @@ Sources: Walker, Ni (2011), Anderson acceleration for fixed-point iterations; Pr
 Suryanarayana, Pask (2016) for the steps between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -16,8 +16,6 @@ by an inner iteration: if c1 G <= Q <= c2 G then the preconditioned system is th
 whatever sticks, slips or is open. Q is needed once per iteration.
 """
 
-from __future__ import annotations
-
 import logging
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ preconditioned by the inverse of the symbol of Q on the grid without padding, re
 contacts that are closed and to the directions that are held.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 

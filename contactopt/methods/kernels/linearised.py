@@ -7,8 +7,6 @@ of Q.
 Contacts with D = 0 are open: their dr is known, and they leave the system.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -8,8 +8,6 @@ Source of the accuracy of steps: Eisenstat, Walker (1996), Choosing the forcing 
 Newton method, SIAM J. Sci. Comput. 17, 16-32.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar

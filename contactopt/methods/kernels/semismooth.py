@@ -6,8 +6,6 @@ is the square root of its accuracy off wherever force and gap vanish together. W
 map it is Newton's method for the whole problem (Alart-Curnier; Hueber, Stadler, Wohlmuth 2008).
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -32,7 +30,6 @@ Projection = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 STEPS = 20  # of a crossover
 # added to Q in every Newton system: directions without compliance stay where they are
 RIDGE = 1e-10
-GOOD = 1e-14  # relative residual below which rounding is all that is left
 # relative residuals up to which an answer needs no second try, and above which it is none
 EXACT, WRONG = 1e-9, 1e-5
 
@@ -212,6 +209,6 @@ def _improve(
         if at.residual < best[0]:
             best = (at.residual, *at.point)
         size = max(1.0, float(np.linalg.norm(at.point[0])))
-        if at.residual <= GOOD * size or at.residual > 1e6 * best[0]:
+        if at.residual <= 1e-14 * size or at.residual > 1e6 * best[0]:  # rounding
             break
     return best

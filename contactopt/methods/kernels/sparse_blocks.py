@@ -5,8 +5,6 @@ the order of elimination and the places of its entries are found once; a system 
 array operations and one sparse LU factorisation (SuperLU).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeAlias
 

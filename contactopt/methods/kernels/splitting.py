@@ -4,8 +4,6 @@
 A backend's answer is made exact by active-set steps, or asked for again at tighter settings.
 """
 
-from __future__ import annotations
-
 from operator import itemgetter
 
 import numpy as np

@@ -36,7 +36,6 @@ from contactopt.problem.feasibility import MARGIN
 
 EXACT = 1e-10  # relative size of what rounding leaves of a zero in a contradiction
 BRANCH = 3e5  # entries that pivots change in the time that the rest of a branch takes
-FRESH = 50  # pivots after which a tableau is made again from the data
 SAME = 1e-7  # relative size of what counts as zero when a point is given its states
 HALVED = 4  # how often an arc of 90 degrees is halved
 FREE, SHUT, DECIDED, SLIPPING = range(4)  # what a branch says of a contact in space
@@ -249,7 +248,7 @@ class StateTree:
 
     def feasible(self, branch: _Branch) -> bool:
         """Whether the branch may have a point, to which its tableau is brought."""
-        doubtful, fresh = np.zeros(len(branch.b), dtype=bool), branch.pivots > FRESH
+        doubtful, fresh = np.zeros(len(branch.b), dtype=bool), branch.pivots > 50
         doubtful[self.n : self.n + len(self.problem.s)] = True  # multipliers have either sign
         if fresh:
             branch.remake()

@@ -3,8 +3,6 @@
 the other as it is given. Each step is one PCG of contactopt.methods.kernels.krylov.
 """
 
-from __future__ import annotations
-
 from itertools import islice
 
 import numpy as np

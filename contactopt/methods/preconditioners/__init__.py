@@ -26,8 +26,6 @@ holds on every subspace with the same constants, so that (G_AA)^-1, by an inner 
 body, has the condition number of P on any active set (`restricted`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -46,7 +44,6 @@ from contactopt.problem import InterfaceProblem, part_of
 ACTIVE = 1e-10  # relative accuracy of the inner solve of a preconditioner on an active set
 # share of a smooth motion's energy, apart from that of others, below which it is one of them
 DEPENDENT = 1e-10
-LEFT = 1e-6  # share of a random force's work below which deflation leaves nothing to scale by
 
 
 class Preconditioner(LinearOperator):
@@ -264,7 +261,7 @@ def _scales(P: Preconditioner, Q: Interface, QZ: np.ndarray) -> np.ndarray:
     rest = whole - np.sum((QZ.T @ X) ** 2, axis=0)
     c = np.ones(len(QZ))
     for i, own in enumerate(P.blocks):
-        work = rest[i] if rest[i] > LEFT * whole[i] else whole[i]
+        work = rest[i] if rest[i] > 1e-6 * whole[i] else whole[i]  # enough to scale by
         c[own] = float(random[own] @ made[own]) / work if work > 0 else 1.0
     return c
 

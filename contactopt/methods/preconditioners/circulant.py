@@ -1,7 +1,5 @@
 """The paper's circulant preconditioners P21, P22 and P31 (section 5.2)."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.fft import fft, ifft, irfft, rfft
 from scipy.sparse.linalg import LinearOperator, cg

@@ -1,7 +1,5 @@
 """The grid of the contacts: a line, a closed curve or a rectangle that transforms work on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -84,9 +82,7 @@ def _grid_of(problem: InterfaceProblem, held: np.ndarray) -> tuple[Grid, np.ndar
 
 @dataclass(frozen=True)
 class OnGrid:
-    """A preconditioner made from a function of the grid, whose docstring it has, that gives
-    products with P and, where it is cheap, P^-1 on arrays (*shape, dim).
-    """
+    """A preconditioner from a function of the grid that gives products with P and maybe P^-1."""
 
     make: Callable[[Grid], GridMaps]
 

@@ -8,8 +8,6 @@ numbers up to smooth terms. On a surface the kernel is 1 / |x_i - x_j|, and a di
 spacing has eigenvectors of its own: a matrix as small as one side of the grid.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial

@@ -24,8 +24,6 @@ contour integrals, method 3 for the square root. Johnson (1985), Contact mechani
 the compliance of the half-space.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

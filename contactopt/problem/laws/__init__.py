@@ -21,8 +21,6 @@ Sources: De Saxce, Feng (1998), The bipotential method; Alart, Curnier (1991), A
 for frictional contact problems prone to Newton like solution methods.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import numpy as np

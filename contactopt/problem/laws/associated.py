@@ -1,7 +1,5 @@
 """Friction with an associated flow rule: slip dilates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

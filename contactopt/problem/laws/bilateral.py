@@ -1,7 +1,5 @@
 """Contact without separation: the normal force may pull, and friction counts its size."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Coulomb friction at contacts that may open, eqs (15) to (17) of the paper."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

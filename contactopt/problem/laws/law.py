@@ -221,9 +221,7 @@ class Law:
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Law:
-        """The law of the k contacts of a scene. `values` are the scene's friction coefficients, or
-        what the law reads in their place: one number, or (k,). InputError on another shape.
-        """
+        """The law of k contacts from a scene's values, one or (k,); InputError on another shape."""
         if values.shape not in ((), place.areas.shape):
             raise InputError(
                 "the friction of a scene must be one number or one per contact, shape"

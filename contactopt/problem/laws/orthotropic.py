@@ -42,8 +42,6 @@ from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.law import Law, Projected
 from contactopt.problem.laws.place import Place
 
-MOST = 60  # steps of Newton's method for the projection on an ellipse; it takes about five
-
 
 @dataclass(frozen=True, eq=False)
 class Orthotropic(Law):
@@ -170,7 +168,7 @@ class _Ellipse:
         self.a = a = np.where(radii > 0, radii, 1.0)
         self.outside = (np.linalg.norm(t / a, axis=1) > 1) & ~self.flat
         self.l = np.zeros(len(t))
-        for _ in range(MOST):
+        for _ in range(60):  # Newton's steps; it takes about five
             # Newton's method on 1 / |x / a| = 1, which is concave: it comes from one side
             z = a * t / (a**2 + self.l[:, None])
             size = np.linalg.norm(z, axis=1)

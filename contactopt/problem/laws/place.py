@@ -1,7 +1,5 @@
 """What a law may know of the place of a scene's contacts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kinds of analysis: one file each, one row here."""
 
-from __future__ import annotations
-
 from contactopt.scenes.kinds.axisymmetric import Axisymmetric
 from contactopt.scenes.kinds.kind import Kind
 from contactopt.scenes.kinds.plane_strain import PlaneStrain

@@ -1,7 +1,5 @@
 """Bodies of revolution, without twist: the half section at r >= 0 stands for them."""
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 from contactopt.scenes.kinds.kind import Kind

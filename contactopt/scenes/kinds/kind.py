@@ -1,7 +1,5 @@
 """What a kind of analysis is: what its bodies stand for, and what follows from that."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from contactopt.material import Material, lame, lame_by_poisson

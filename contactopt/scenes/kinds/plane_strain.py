@@ -1,7 +1,5 @@
 """Plane strain: a section of bodies that are long across it, and do not strain that way."""
 
-from __future__ import annotations
-
 from contactopt.scenes.kinds.kind import Kind
 
 

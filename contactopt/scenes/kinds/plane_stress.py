@@ -8,8 +8,6 @@ sigma_zz = lambda (e_xx + e_yy + e_zz) + 2 G e_zz = 0 gives e_zz, and with it
 Source: Timoshenko, Goodier (1970), Theory of elasticity, chapter 2.
 """
 
-from __future__ import annotations
-
 from contactopt.material import Material, lame, lame_by_poisson
 from contactopt.scenes.kinds.kind import Kind
 

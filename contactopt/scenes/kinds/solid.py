@@ -1,7 +1,5 @@
 """Bodies in space."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 from contactopt.scenes.kinds.kind import Kind

@@ -1,7 +1,5 @@
 """Loads on bodies: one file each, one row here."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 from contactopt.scenes.loads.load import Load

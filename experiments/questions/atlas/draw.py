@@ -85,9 +85,14 @@ def agreement(rows: list[Row]) -> Any:
         ratio = np.array([row["observed"] / row["predicted"] for row in own], float)
         colour = ORANGE if " " in name else BLUE
         ax.plot(ratio, np.full(len(ratio), place), "o", color=colour, ms=3, alpha=0.6, mew=0)
+        hit = int(np.isfinite(ratio).sum())
+        text = f"{hit} of {len(ratio)}"
+        ax.text(1.053, place, text, color=colour, va="center", fontsize=LETTERS, clip_on=False)
+    ax.axvspan(0.95, 1.05, color="#999999", alpha=0.12, lw=0)
+    ax.text(1.053, len(names) - 0.35, "within 5 %", va="bottom", fontsize=LETTERS, clip_on=False)
     ax.axvline(1.0, color="#666666", lw=0.8)
     ax.set_yticks(range(len(names)), names[::-1])
-    ax.set(xlim=(0.95, 1.05), xlabel="observed over predicted friction of failure")
+    ax.set(xlim=(0.945, 1.05), xlabel="observed over predicted friction of failure")
     return figure
 
 

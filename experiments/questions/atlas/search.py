@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from experiments.questions.atlas.radii import newton_load, one_contact, pair
 
 SIZES, SHARES = (1, 2, 3, 5, 8), (0.35, 0.3, 0.2, 0.1, 0.05)  # contacts, and how often
 CLEAR = 1e-4  # certificate above which a failure is no matter of the measure of errors
-MOST, SECONDS = 10_000, 100.0  # problems of a method; seconds after which a search ends
+BLOCK, SECONDS = 1000, 100.0  # problems of one seed; seconds after which a search of a method ends
+ROUNDING = 1e-14  # by which shorter numbers may make Q less definite, relative to its largest value
 WORSE, STEP = 0.15, 0.3  # share of the problems that are made worse; their change
 # of our methods: until a run counts as one without an end, which is no failure; at last
 PATIENCE = 20.0
@@ -32,7 +34,7 @@ NAMES = [
 ]
 
 
-def search(name: str, seed: int = 0, most: int = MOST, seconds: float = SECONDS) -> dict[str, Any]:
+def search(name: str, seed: int = 0, most: int = BLOCK, seconds: float = SECONDS) -> dict[str, Any]:
     """Problems tried and failed with each mechanism alone, with none and with several, and the
     smallest failing problem.
     """
@@ -42,17 +44,17 @@ def search(name: str, seed: int = 0, most: int = MOST, seconds: float = SECONDS)
     tried, failed = Counter[str](), Counter[str]()
     found: list[tuple[tuple[float, ...], Case]] = []
     hardest: tuple[float, Case] | None = None
-    for count in range(most):
+    for number in range(most):
         if clock() > end:
             break
-        kind = ["none", "several", *knobs][count % (len(knobs) + 2)]
+        kind = ["none", "several", *knobs][number % (len(knobs) + 2)]
         k = int(random.choice(SIZES, p=SHARES))
         dim = 2 if name in PLANE else int(random.integers(2, 4))
         on = {"none": set(), "several": set(knobs)}.get(kind, {kind})
         case = draw(random, k, dim, on, always=kind not in ("none", "several"))
         if hardest and kind == "several" and random.random() < WORSE * len(knobs):
             case = mutated(random, hardest[1])
-        got = run(name, case, PATIENCE)
+        k, got = len(case.q), run(name, case, PATIENCE)
         if got.status in ENDLESS:
             continue
         decade = f"mu {np.floor(2 * np.log10(case.mu.max())) / 2:g}"
@@ -69,9 +71,28 @@ def search(name: str, seed: int = 0, most: int = MOST, seconds: float = SECONDS)
         case = smaller(name, case)
         last = run(name, case)
         if last.failed:
-            return out | {"case": case.numbers, "what": last.what, "status": last.status,
-                          "residual": last.residual}  # fmt: skip
+            return out | {"case": case.numbers}
     return out
+
+
+def continued(name: str, row: dict[str, Any], seconds: float = SECONDS) -> Iterator[dict[str, Any]]:
+    """The row of a method with the problems of further seeds, block by block. It goes on after the
+    last seed of the row, so that a search may be ended and continued.
+    """
+    start, begun = time.perf_counter(), row.get("seeds", 0)
+    row = row if begun else {"method": name}
+    for seed in count(begun):
+        left = seconds - (time.perf_counter() - start)
+        if left <= 0:
+            return
+        found = search(name, seed, seconds=left)
+        for key in ("tried", "failed"):
+            row[key] = dict(Counter(row.get(key, {})) + Counter(found[key]))
+        old, new = row.get("case"), found.get("case")
+        if new and (not old or len(new["q"]) < len(old["q"])):
+            row["case"] = new
+        row["seeds"] = seed + 1
+        yield row
 
 
 def mutated(random: np.random.Generator, case: Case) -> Case:
@@ -109,9 +130,16 @@ def smaller(name: str, case: Case) -> Case:
                 break
             case = new
     for digits in (2, 3, 4, 6):
-        if fails(new := rounded(case, digits)):
+        new = rounded(case, digits)
+        if definite(new) >= min(definite(case), 0.0) - ROUNDING and fails(new):
             return new
     return case
+
+
+def definite(case: Case) -> float:
+    """The least eigenvalue of the symmetric part of Q, over the largest one."""
+    values = np.linalg.eigvalsh(case.Q + case.Q.T)
+    return float(values[0] / values[-1])
 
 
 def rounded(case: Case, digits: int) -> Case:
@@ -176,6 +204,7 @@ WEDGED = Case(
     FLAT @ FLAT.T, np.zeros((1, 3)), np.array([2.1]), np.zeros((3, 0)), np.zeros(0),
     np.array([[1.7, 0.0608, -3.57]]), np.array([[0.0, -0.0046, 0.27]]),
 ).loaded()  # fmt: skip
+SINGULAR = one_contact(1.0, 0.5, 1.0, 0.1)  # Q = (1, 1; 1, 1): the contact cannot move across it
 # problems that follow from the mathematics, or that a longer search has found
 KNOWN: dict[str, Case] = {
     "newton": newton_load(0.5, 2.5),
@@ -193,4 +222,7 @@ KNOWN: dict[str, Case] = {
     "siconos TFP": one_contact(0.5, 2.2, -1.0),
     "siconos PFP": one_contact(0.5, 2.2, -1.0),
     "siconos ACLMFP": one_contact(0.97, 0.7, 1.0),
+    "siconos NSN_AC": SINGULAR,
+    "siconos NSN_AC_TEST": SINGULAR,
+    "siconos NSN_NM": SINGULAR,
 }

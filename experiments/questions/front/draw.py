@@ -32,6 +32,10 @@ ASKED = {  # scene -> the quantity that is asked of it
 }
 SHORT = {"half-space": "½", "small body": "B", "associated": "A", "mu = .3": "F"}
 SHORT |= {"solid": "S", "linear": "L", "quadratic": "Q", "uniform": "U", "Gauss": "G"}
+KEY = (
+    "½ half-space   L, Q linear, quadratic   S solid   G Gauss-Seidel\n"
+    "B small body   A associated   F friction added   number: elements or points"
+)
 KINDS = ("model", "mesh", "reading", "tolerance")
 TOLD = ("half-space", "linear", "quadratic", "small body", "mu = .3", "uniform")
 
@@ -101,6 +105,7 @@ def draw_front(made: list[Row]) -> Any:
     bar.set_ticks([-2, -1, 0], labels=["0.01", "0.1", "1"])
     bar.ax.tick_params(labelsize=LETTERS)
     bar.set_label("CPU time [s]", fontsize=LETTERS)
+    figure.suptitle(KEY, fontsize=LETTERS - 1)
     return figure
 
 
@@ -128,6 +133,7 @@ def draw_line(rows: list[Row], peers: list[Row]) -> Any:
         ax.loglog(x, y, mark + ":", color="k", mfc="w", lw=0.6)
         ends.append((x[-1], y[-1], code, "k"))
     ax.axhline(0.01, color=GREY, lw=0.6, ls=":")
+    ax.text(10, 0.011, "1 %", color=GREY, fontsize=LETTERS, ha="right", va="bottom")
     ax.set(xlabel="CPU time [s]", ylabel="error of the peak pressure [-]")
     label_ends(ax, ends)
     return figure
@@ -161,8 +167,15 @@ def draw_regions(rows: list[Row]) -> Any:
     for ax in axes[::2]:
         ax.set_ylabel("tolerance")
     signs = [Patch(color=colours(number), label=kind) for number, kind in enumerate(KINDS)]
+    title = "the largest error, and their sum in percent"
     figure.legend(
-        handles=signs, ncols=4, loc="outside upper center", fontsize=LETTERS, frameon=False
+        handles=signs,
+        ncols=4,
+        title=title,
+        title_fontsize=LETTERS,
+        loc="outside upper center",
+        fontsize=LETTERS,
+        frameon=False,
     )
     return figure
 
@@ -175,12 +188,26 @@ def draw_rule(rows: list[Row]) -> Any:
         x, y = row["ratio"], max(abs(row["rule error"]) / row["accuracy"], 1e-3)
         ax.loglog(x, y, "o" if good else "x", color=COLOURS[0] if good else COLOURS[1], ms=4)
         if not good:
-            ax.annotate(row["scene"], (x, y), fontsize=LETTERS, color=COLOURS[1], xytext=(3, 3),
-                        textcoords="offset points")  # fmt: skip
-    ax.axhline(1, color=GREY, lw=0.8)
-    ax.axvline(2, color=GREY, lw=0.8)
-    ratios = [row["ratio"] for row in rows]
-    ax.set(xlim=(0.7 * min(ratios), 2 * max(ratios)), xlabel="time over the best in hindsight [-]")
+            left_of = x < 1.05
+            ax.annotate(
+                row["scene"].partition(",")[0],
+                (x, y),
+                fontsize=LETTERS - 1,
+                color=COLOURS[1],
+                xytext=(-4 if left_of else 4, 0),
+                textcoords="offset points",
+                ha="right" if left_of else "left",
+                va="center",
+            )
+    ratios, low = [row["ratio"] for row in rows], 5e-4
+    left, right, top = 0.7 * min(ratios), max(5.0, 2 * max(ratios)), 6.0
+    ax.axhspan(1, top, color=COLOURS[1], alpha=0.12, lw=0)
+    ax.fill_between([2, right], low, 1, color=COLOURS[1], alpha=0.12, lw=0)
+    ax.text(0.98 * right, 0.75 * top, "not accurate", ha="right", va="top", fontsize=LETTERS)
+    ax.text(0.98 * right, 1.3 * low, "too slow", ha="right", fontsize=LETTERS)
+    good = sum(abs(r["rule error"]) <= r["accuracy"] and r["ratio"] <= 2 for r in rows)
+    ax.text(1.05 * left, 1.3 * low, f"{good} of {len(rows)} scenes", fontsize=LETTERS)
+    ax.set(xlim=(left, right), ylim=(low, top), xlabel="time over the best in hindsight [-]")
     ax.set(ylabel="error over the accuracy asked for [-]")
     ax.set_xticks([0.5, 1, 2, 4], ["1/2", "1", "2", "4"])
     ax.minorticks_off()
