@@ -17,9 +17,9 @@ import numpy as np
 import contactopt
 from contactopt import InterfaceProblem, Solution, scenes, solve
 from contactopt.coupling.reduction import reduce_bodies
+from contactopt.defaults import TOL
 from contactopt.derivatives.states import chain_of
 from contactopt.jax import solve as jax_solve
-from contactopt.defaults import TOL
 from contactopt.problem.scaling import immovable
 from contactopt.readings.quantities import seeds_of
 from contactopt.scenes.parameters import parameters
