@@ -51,22 +51,23 @@ class SymmetryPlane:
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """The planes, at most one per component, on which exactly this component is held, and which the
-    surface crosses smoothly: a slanted one has an edge there, and each side its own normal.
+    """The planes, at most one per component, at an end of the surface, where this component is held
+    and the normal one is not, and which the surface crosses smoothly: a slanted one has an edge
+    there, and each side its own normal. A plate or a clamp may hold the surface elsewhere, too.
     """
     tilts = smooth_tilts(contacts.normals, contacts.cells)
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     for c, mask in enumerate(held):
-        if not mask.any():
-            continue
-        offset = float(points[c, mask].mean())
-        plane = np.abs(points[c] - offset) <= EQUAL * contacts.size
-        side = np.sign(points[c, ~plane] - offset)
-        tangential = np.all(np.abs(normals[c, plane]) <= tilts[plane])
-        # along the normal, at least
-        moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > EQUAL), axis=0)
-        if np.array_equal(plane, mask) and len(set(side)) == 1 and tangential and np.all(moves):
-            planes.append(SymmetryPlane(side[0] * np.eye(len(points))[c], offset * side[0]))
+        found = []
+        for side in (1.0, -1.0) if mask.any() else ():
+            offset = float((side * points[c]).min())
+            plane = side * points[c] - offset <= EQUAL * contacts.size
+            tangential = np.all(np.abs(normals[c, plane]) <= tilts[plane])
+            # along the normal, at least, but for ends that are clamped
+            moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > EQUAL), axis=0)
+            if np.all(mask[plane]) and not np.all(plane) and tangential and np.mean(moves) > 0.5:
+                found.append(SymmetryPlane(side * np.eye(len(points))[c], offset))
+        planes += found if len(found) == 1 else []
     return planes
 
 
