@@ -99,8 +99,8 @@ def test_it_installs_and_runs_in_an_empty_environment(wheel, plain, tmp_path):
     user.write_text(
         "import contactopt\nreveal_type(contactopt.run('punch-2d').solution.residual)\n"
     )
-    told = run(sys.executable, "-m", "mypy", "--python-executable", binaries / "python", user,
-               cwd=tmp_path)  # fmt: skip
+    told = run(sys.executable, "-m", "mypy", "--config-file=", "--python-executable",
+               binaries / "python", user, cwd=tmp_path)  # fmt: skip
     assert re.search(r'"(builtins\.)?float"', told), "users' type checkers see the types"
 
 
