@@ -217,7 +217,7 @@ class _Loop:
         return np.concatenate([overlooked(reduction, touching, apart), *few]).astype(int)
 
     def _limit(self, last: float) -> str:
-        """Choose the next mesh; one sentence if it passes a limit. `last` is this time [s]."""
+        """Choose the next mesh; one sentence if it passes a limit. The last one took `last` [s]."""
         unknowns = self.search.advance(self.judged, self.reading, self.unresolved, self.rivals)
         growth = unknowns / self.levels[-1].unknowns
         held = (resident_memory() - self.before) * (1 + growth)

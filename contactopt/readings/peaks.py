@@ -214,7 +214,7 @@ def _fit_to(
     # rings at an axis bear little
     at_top *= min(1.0, float(np.sqrt(problem.areas[top] / areas.mean())))
     beside = 0.0
-    if dim > 1:  # no contact of these has its neighbours farther from the top than three times
+    if dim > 1:  # the neighbours of all these contacts are within three times their reach
         some = usable[node] & ((distance <= 3.01 * reach) | (len(near) < NEIGHBOURS[3]))
         beside = _beside_open(places, pressure[node], some, near)
     doubt = max(scatter / 2, at_top / 2, BESIDE * beside * nodal**2)
