@@ -9,10 +9,24 @@ This is the length that the points have to resolve, so that the error of the pre
 (m - 1)^2, relative to a parabola. The approach is an average and grows with m. Below a profile with
 m < 2 the pressure has a cusp or is infinite, and a width next to a steep edge cannot be fitted:
 there is no rule for these.
+
+The errors of strain with linear elements cost energy by their shear and by their change of volume.
+The latter weighs f = (1 - nu) / (1 - 2 nu) times as much (the uniaxial modulus over 2 G), so that
+errors of pressure and approach grow like 1 + f.
+
+A body that is pressed all around, as a shaft in a hub, has no half-width. Outside a hole of radius
+R in a thick wall the strain is B / r^2. Linear elements of size h miss a share f (h / R)^2 / 12 of
+its energy, and of the pressure. There n counts elements of size h along the surface.
+
+The points of a half-space under a disc fill an area with steps along its edge, whose mean distance
+from the circle falls like 1 / n: so do the errors of the approach and of the zone of stick.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import ceil, sqrt
+from functools import partial
+from math import ceil, inf, pi, sqrt
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -20,34 +34,37 @@ from scipy.spatial import cKDTree
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.coupling.posed import Posed
 from contactopt.defaults import CLOSE
+from contactopt.errors import InputError
 from contactopt.scenes.scene import HalfSpace, Part, Scene
 
 # what the edge of contact is: it ends by itself, at a corner of a body, or nowhere;
-# degree of the displacement, 0 for a half-space without a mesh -> quantity -> error times n^2
+# degree of the displacement, 0 for a half-space without a mesh -> quantity -> error times n^2;
+# where it ends nowhere, times (R / h)^2
 CONSTANTS: dict[tuple[str, int], dict[str, float]] = {
     ("free", 0): {"pressure": 0.1, "width": 0.4, "approach": 0.07, "stick": 2.2},
     ("free", 1): {"pressure": 0.4, "width": 0.8, "approach": 2.0, "stick": 2.1},
     ("free", 2): {"pressure": 0.05, "width": 0.35, "approach": 0.3, "stick": 0.8},
-    ("corner", 0): {"stick": 2.4},
     ("corner", 1): {"approach": 1.7, "stick": 6.6},
     ("corner", 2): {"approach": 0.15, "stick": 1.9},
-    ("none", 1): {"pressure": 0.8},
-    ("none", 2): {"pressure": 0.1},
+    ("none", 1): {"pressure": 0.15},
+    ("none", 2): {"pressure": 0.04},
 }
+POISSON = 0.3  # Poisson's ratio of the scenes with these constants
 # around a contact in three dimensions many points say where the stick zone ends, and their errors
 # cancel
 AROUND = {"stick": 0.3}
-# error of the approach of a disc times n: the evenly spaced points fill another area than the disc
-DISC = 0.12
+DISC = {"approach": 0.12, "stick": 0.12}  # error times n of a disc on the points of a half-space
 # seconds of a solution on one core: the first without regard to the mesh, the second times n^2;
-# of a half-space by (three dimensions?, friction?), of a mesh in two dimensions by its degree
+# of a half-space by (three dimensions?, friction?)
 POINTS = {
     (False, False): (0.012, 1e-5),
     (False, True): (0.027, 2.5e-5),
     (True, False): (0.022, 6e-5),
     (True, True): (0.045, 3e-4),
 }
-MESHES = {1: (0.06, 3e-4), 2: (0.07, 1.4e-3)}
+# of a mesh in two dimensions: the first by its degree, for each unknown, and how often it is solved
+# until the zone of a contact that ends by itself has settled
+FIRST, UNKNOWN, ROUNDS = {1: 0.045, 2: 0.065}, 1.4e-5, 1.7
 FREE = 1 / 3  # by this share of the first seconds a mesh may be finer than an accuracy asks for
 # error of a half-space for a body of some half-widths of contact: of the approach it falls with
 # this size, of the rest with its square
@@ -78,6 +95,9 @@ class ContactFacts:
     power     m of the profile x^m, where the edge is free
     solid     whether the scene has three dimensions
     friction  whether there is friction
+    poisson   the largest Poisson's ratio of the bodies, in plane stress nu / (1 + nu)
+    turn      length of the surface that is modelled over its radius, where the edge is 'none'
+    unknowns  of the mesh with n linear elements, infinite where it cannot be made
     """
 
     edge: str
@@ -85,11 +105,15 @@ class ContactFacts:
     power: float = 2.0
     solid: bool = False
     friction: bool = False
+    poisson: float = POISSON
+    turn: float = pi / 2
+    unknowns: Callable[[int], float] = lambda n: 11.0 * n**2  # of a half-space
 
     def elements(self, quantity: str, degree: int, accuracy: float) -> int | None:
         """How many an accuracy needs; None where there is no rule."""
-        if (self.edge, degree, quantity) == ("corner", 0, "approach"):
-            return ceil(SAFETY * DISC / accuracy)
+        if self.edge == "corner" and degree == 0:
+            steps = DISC.get(quantity) if self.solid else None
+            return None if steps is None else ceil(SAFETY * steps / accuracy)
         own = CONSTANTS.get((self.edge, degree), {}).get(quantity)
         if own is None:
             return None
@@ -101,11 +125,24 @@ class ContactFacts:
                 own *= max(1.0, self.power - 1) ** 2
             else:
                 return None
+        if self.edge == "none":
+            own *= self.turn**2 * max(1.0, _volume(self.poisson) / _volume(POISSON))
+        elif degree == 1 and quantity in ("pressure", "approach"):
+            own *= max(1.0, (1 + _volume(self.poisson)) / (1 + _volume(POISSON)))
         return ceil(sqrt(SAFETY * own / accuracy))
 
-    def seconds(self, degree: int) -> tuple[float, float]:
-        """The two numbers of the cost."""
-        return MESHES[degree] if degree else POINTS[self.solid, self.friction]
+    def seconds(self, degree: int, elements: int) -> tuple[float, float]:
+        """The two numbers of the cost, about a number of elements."""
+        if degree == 0:
+            return POINTS[self.solid, self.friction]
+        rounds = ROUNDS if self.edge == "free" else 1.0
+        growing = UNKNOWN * self.unknowns(elements) * (degree / elements) ** 2
+        return rounds * FIRST[degree], rounds * growing
+
+
+def _volume(nu: float) -> float:
+    """The uniaxial modulus over 2 G."""
+    return (1 - nu) / (1 - 2 * nu)
 
 
 def propose(
@@ -120,7 +157,9 @@ def propose(
         fits = degree > 0 or half_space_fits(quantity, accuracy, contact.size)
         if needed is None or not fits:
             continue
-        first, growing = contact.seconds(degree)
+        first, growing = contact.seconds(degree, needed)
+        if growing == inf:
+            continue
         elements = max(int(sqrt(FREE * first / growing)), needed)
         seconds = first + growing * elements**2
         found.append(Proposal(degree, elements, 0.01 * accuracy, seconds))  # for the solver
@@ -144,21 +183,25 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
     width = scene.zone or float(np.linalg.norm(np.ptp(own.positions, axis=1))) / 2
     if scene.zone is None and (scene.kind == "axisymmetric" or scene.copies > 1):
         width *= 2  # the half that is modelled is as wide as the half-width
-    bodies = [body.body for body in made.bodies if isinstance(body, AssembledElastic)]
-    sizes = [float(np.ptp(body.locations, axis=1).min()) / width for body in bodies]
+    bodies = [body for body in made.bodies if isinstance(body, AssembledElastic)]
+    sizes = [float(np.ptp(body.body.locations, axis=1).min()) / width for body in bodies]
     size = min(sizes, default=np.inf)
+    meshed: dict[str, Any] = {}
+    if bodies:
+        unknowns = partial(unknowns_of, scene)
+        meshed = {"poisson": _poisson(scene), "turn": turn_of(scene, made), "unknowns": unknowns}
     flat = all(part.curve is None for part in scene.parts if isinstance(part, Part))
     meshes = (1, 2) if scene.dim == 2 else ()
     power = power_of(own.positions, own.gap, width) if edge == "free" else 2.0
-    contact = ContactFacts(edge, size, power, scene.dim == 3, _rubs(scene))
+    contact = ContactFacts(edge, size, power, scene.dim == 3, _rubs(scene), **meshed)
     found = propose(quantity, accuracy, contact, (0, *meshes) if flat else meshes)
     if found is None:
         return []
     what = "stick width" if quantity == "stick" else "largest pressure"
     across = (
-        f"{found.elements} {'points' if found.degree == 0 else 'elements'} across the half-width"
+        f"{found.elements} {'points' if found.degree == 0 else 'elements'}"
+        f" {'along the surface' if edge == 'none' else 'across the half-width'}"
     )
-    seconds = found.seconds * (max(1, len(bodies)) if found.degree else 1)
     way = {0: "a half-space without a mesh", 1: "linear", 2: "quadratic displacements"}[
         found.degree
     ]
@@ -166,7 +209,7 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
     here = f"here {scene.elements}" if given or found.degree else "here there are meshes"
     return [
         f"for {accuracy:.0%} of the {what}: {way}, {across} of contact ({here}), tolerance"
-        f" {found.tolerance:.0e}, about {seconds:.1g} s"
+        f" {found.tolerance:.0e}, about {found.seconds:.1g} s"
     ]
 
 
@@ -183,6 +226,33 @@ def edge_of(scene: Scene, made: Posed) -> str:
         if turned < CLOSE or (scene.kind == "axisymmetric" and abs(normals[0, 0]) > 0.5)
         else "corner"
     )
+
+
+def turn_of(scene: Scene, made: Posed) -> float:
+    """The length of the modelled contact surface over its radius: the angle by which it turns, or
+    the length along the axis over the distance from it.
+    """
+    own = made.couplings[0]
+    if scene.kind == "axisymmetric":
+        return float(np.ptp(own.positions[1]) / np.abs(own.positions[0]).mean())
+    normals = own.frames[:, 0]
+    return float(np.arccos(np.clip((normals @ normals[0]).min(initial=1.0), -1, 1)))
+
+
+def unknowns_of(scene: Scene, elements: int) -> float:
+    """Of its meshes with linear displacements; infinite where they cannot be made."""
+    parts = [part for part in scene.parts if isinstance(part, Part)]
+    try:
+        return sum(float(part.build_mesh(elements, scene.zone).p.size) for part in parts)
+    except InputError:
+        return inf
+
+
+def _poisson(scene: Scene) -> float:
+    """The largest Poisson's ratio of the bodies; in plane stress that of their strain in plane."""
+    ratios = [part.material.nu for part in scene.parts if isinstance(part, Part)]
+    largest = max(ratios, default=POISSON)
+    return largest / (1 + largest) if scene.kind == "plane-stress" else largest
 
 
 def power_of(positions: np.ndarray, gap: np.ndarray, width: float) -> float:

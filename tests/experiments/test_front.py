@@ -53,7 +53,7 @@ def test_an_ellipse_that_is_round_is_hertz():
         (("pressure", 0.01, ContactFacts("free", solid=True)), 0, 11),  # points cost n^2 there
         (("stick", 0.03, ContactFacts("free", solid=True, friction=True)), 0, 7),
         (("pressure", 0.003, ContactFacts("free", power=4.0, solid=True)), 0, 22),
-        (("pressure", 0.01, ContactFacts("free", 5.0)), 1, 8),  # the body is no half-space
+        (("pressure", 0.01, ContactFacts("free", 5.0)), 1, 9),  # the body is no half-space
         (("approach", 0.001, ContactFacts("free", 1e4), (1, 2)), 2, 22),
         (("stick", 0.003, ContactFacts("corner"), (1, 2)), 1, 58),
         (("approach", 0.01, ContactFacts("corner", solid=True)), 0, 18),
@@ -101,6 +101,7 @@ def test_the_rule_meets_its_accuracy_on_scenes_that_it_has_not_seen():
     ("name", "words"),
     [
         ("sphere", "8 elements across the half-width of contact (here 32)"),
+        ("press-fit", "9 elements along the surface of contact (here 14)"),
         ("hertz-half-space", "11 points across the half-width of contact (here 48)"),
         ("rigid-punch-2d", "for 1% of the stick width"),
         ("punch-2d", ""),  # two elastic bodies with corners

@@ -39,7 +39,7 @@ KEYS = ("scene", "model", "mesh", "tolerance", "reading")
 OTHERS: dict[str, Callable[[], list[Row]]] = {
     "regions": regions,
     "unseen": lambda: [row for seed in SEEDS for case in unseen(seed) for row in tried(case, seed)],
-    "rule": lambda: judged(stored(NAME, "unseen")),
+    "rule": lambda: list(judged(stored(NAME, "unseen"))),
     "peers": lambda: list(peers()),
 }
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from math import gamma, pi, sqrt
+from math import ceil, gamma, pi, sqrt
 from typing import Any
 
 import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
-from contactopt import HalfSpace, Material, Rigid, Scene, scenes
-from contactopt.accuracy.proposal import ContactFacts, propose
+from contactopt import HalfSpace, Material, Part, Rigid, Scene, scenes
+from contactopt.accuracy.proposal import ContactFacts, propose, unknowns_of
 from contactopt.analytic import (
     Reference,
     contact_modulus,
@@ -21,6 +21,7 @@ from contactopt.analytic import (
     flat_punch_axisymmetric_friction,
     flat_punch_line_friction,
 )
+from contactopt.errors import InputError
 from contactopt.readings.quantities import value_of
 from experiments.questions.accuracy.half_space import flat
 from experiments.questions.classics.blocks import UNIT, bonded, indented
@@ -36,14 +37,19 @@ from experiments.questions.front.bodies import (
 )
 from experiments.questions.front.measured import Row, solved, timed
 
-SEEDS = (1, 2)  # of the scenes that judge the rule; those of seed 0 were looked at when it was made
-MESHES = {0: (4, 6, 8, 12, 16, 24, 32), 1: (3, 4, 6, 8, 12, 16, 24), 2: (2, 3, 4, 6, 8)}
+SEEDS = (3, 4)  # of the scenes that judge the rule; those of 0 to 2 were seen when it was made
+MESHES = {
+    0: (4, 6, 8, 12, 16, 20, 24, 32),
+    1: (3, 4, 6, 8, 12, 16, 20, 24, 32),
+    2: (2, 3, 4, 6, 8, 12),
+}
 SOLID = (2, 3, 4)
 ACCURACIES = (0.03, 0.01, 0.003)
-TOLERANCE, PAIRS = 1e-4, 3
-NEAR = 1.4, 3.0  # ratios of times near enough to 2 to measure both again in turn
+TOLERANCE, TURNS = 1e-4, 7
+NEAR = 1.4  # choices whose time is within this factor of the least are measured again in turn
+FINER = (1.06, 1.12, 1.25, 1.5, 1.75, 2.0)  # meshes that say whether a choice has been lucky
 TOO_LONG = 1.5  # CPU seconds, above which a kind of model is not refined any more
-ROUND = 10.0  # radius of the cylinder on a layer
+ROUND, DEPTH = 10.0, 40.0  # radius of the cylinder on a layer; length of a press fit
 Make = Callable[[], Scene]
 
 
@@ -59,6 +65,14 @@ class Unseen:
     exact: float
     contact: ContactFacts
     ways: dict[Any, Make]
+
+    def __post_init__(self) -> None:
+        """What `contactopt check` sees in a scene with meshes, the rule sees here."""
+        if 1 in self.ways:
+            scene = self.ways[1]()
+            nu = max(part.material.nu for part in scene.parts if isinstance(part, Part))
+            seen = replace(self.contact, poisson=nu, unknowns=partial(unknowns_of, scene))
+            object.__setattr__(self, "contact", seen)
 
 
 def power(m: float, plane: bool, material: Material, height: float = 0.02) -> Known:
@@ -140,11 +154,13 @@ def fitted(kind: str, sizes: tuple[float, float, float], hub: Material, accuracy
     """A press fit of other sizes."""
     bore, radius, outside = sizes
     scene = scenes.press_fit(
-        kind, bore=bore, radius=radius, outside=outside, interference=1e-6 * radius, hub=hub, mu=0.0
-    )
+        kind, bore=bore, radius=radius, outside=outside, interference=1e-6 * radius, hub=hub,
+        mu=0.0, depth=DEPTH,
+    )  # fmt: skip
     name = f"press fit, {bore:.2g} / {radius:.2g} / {outside:.2g}, {kind}"
     peak = scene.reference.peak
-    return Unseen(name, "pressure", accuracy, peak, ContactFacts("none"), both(scene))
+    turn = pi / 2 if kind == "plane-strain" else DEPTH / radius
+    return Unseen(name, "pressure", accuracy, peak, ContactFacts("none", turn=turn), both(scene))
 
 
 def layer(quantity: str, held: bool, height: float, accuracy: float) -> Unseen:
@@ -177,7 +193,7 @@ def sheared(solid: bool, mu: float, share: float, accuracy: float) -> Unseen:
 
 
 def unseen(seed: int) -> list[Unseen]:
-    """Nineteen scenes: their parameters, the quantity and the accuracy are drawn."""
+    """Twenty scenes: their parameters, the quantity and the accuracy are drawn."""
     random = np.random.default_rng(seed)
 
     def between(low: float, high: float) -> float:
@@ -230,6 +246,7 @@ def unseen(seed: int) -> list[Unseen]:
         fit("axisymmetric"),
         layer(edges(), False, between(0.5, 2.0), asked()),
         layer(edges(), True, between(0.5, 2.0), asked()),
+        fit(one("plane-strain", "axisymmetric")),
     ]  # fmt: skip
 
 
@@ -256,6 +273,8 @@ def tried(case: Unseen, seed: int) -> Iterator[Row]:
             return own | {"cpu": np.nan, "error": np.nan, "end": str(wrong)[:80]}
         return own | {"cpu": seconds, "error": error, "end": ""}
 
+    for way in case.ways:  # imports and caches are nobody's time
+        attempt(case, way, 4, TOLERANCE)
     yield tell("rule", rule.degree, rule.elements, rule.tolerance)
     for way in case.ways:
         for mesh in SOLID if way == "solid" else MESHES[way]:
@@ -276,11 +295,41 @@ def without_luck(rows: list[Row]) -> list[Row]:
     return good
 
 
-def judged(rows: list[Row]) -> list[Row]:
-    """For each scene the rule's choice beside the cheapest one that meets the accuracy, and not by
-    luck. Where their times are NEAR the limit, the two are measured once more, PAIRS times in turn.
+def is_steady(case: Unseen, row: Row) -> bool:
+    """Whether meshes that are finer by a little up to twice have the accuracy, too, as far as they
+    can be made.
     """
-    made = []
+    meshes = sorted({ceil(row["mesh"] * factor) for factor in FINER} - {row["mesh"]})
+    for mesh in meshes:
+        try:
+            error = attempt(case, row["way"], mesh, row["tolerance"])[1]
+        except InputError:  # elements so small that they are lost in rounding
+            break
+        if not abs(error) <= row["accuracy"]:
+            return False
+    return True
+
+
+def in_turn(case: Unseen, rows: list[Row]) -> list[Row]:
+    """The choices with the medians of CPU seconds that are measured TURNS times in turn, and the
+    median ratio of the first one's seconds to theirs.
+    """
+    seconds = np.array(
+        [
+            [attempt(case, row["way"], row["mesh"], row["tolerance"])[0] for row in rows]
+            for _ in range(TURNS)
+        ]
+    )
+    ratios = np.median(seconds[:, :1] / seconds, axis=0)
+    medians = np.median(seconds, axis=0)
+    return [row | {"cpu": t, "ratio": r} for row, t, r in zip(rows, medians, ratios)]
+
+
+def judged(rows: list[Row]) -> Iterator[Row]:
+    """For each scene the rule's choice beside the cheapest one that meets the accuracy, and not by
+    luck. The least of many measured times is too small by chance: the choices that are NEAR it are
+    measured again in turn with the rule's, and only these times count.
+    """
     cases = [
         (seed, case)
         for seed in dict.fromkeys(r["seed"] for r in rows)
@@ -289,20 +338,29 @@ def judged(rows: list[Row]) -> list[Row]:
     for seed, case in cases:
         own = [r for r in rows if (r["seed"], r["scene"]) == (seed, case.name)]
         rule = next(row for row in own if row["by"] == "rule")
-        best = min(without_luck(own), key=lambda row: row["cpu"], default=rule)
-        seconds = np.array([[rule["cpu"], best["cpu"]]])
-        if NEAR[0] < rule["cpu"] / best["cpu"] < NEAR[1]:
-            pair = [(case, row["way"], row["mesh"], row["tolerance"]) for row in (rule, best)]
-            seconds = np.array([[attempt(*one)[0] for one in pair] for _ in range(PAIRS)])
-        first, second = np.median(seconds, axis=0)
-        made.append(
+        found = sorted(without_luck(own), key=lambda row: row["cpu"])
+        lucky = []
+        for row in found:
+            if is_steady(case, row):
+                break
+            lucky.append(row)
+        sure = [row for row in found if row not in lucky]
+        near = [row for row in sure if row["cpu"] <= NEAR * sure[0]["cpu"]]
+        near = near[:1] + [row for row in near[1:] if is_steady(case, row)]
+        first, *others = in_turn(case, [rule, *near, *lucky[:1]])
+        honest = others[: len(near)]
+        best = min(honest, key=lambda row: row["cpu"], default=first)
+        if first["cpu"] < best["cpu"] and abs(rule["error"]) <= case.accuracy:
+            best = first
+        row = (
             {"seed": int(seed), "scene": case.name, "quantity": case.quantity}
             | {"accuracy": case.accuracy}
             | {f"rule {name}": rule[name] for name in ("way", "mesh", "error")}
             | {f"best {name}": best[name] for name in ("way", "mesh", "error")}
-            | {"rule cpu": float(first), "best cpu": float(second)}
-            | {"ratio": float(np.median(seconds[:, 0] / seconds[:, 1]))}
+            | {"rule cpu": float(first["cpu"]), "best cpu": float(best["cpu"])}
+            | {"ratio": float(best["ratio"])}
+            | {"lucky ratio": float(max(own["ratio"] for own in (*others, best)))}
             | {"meets": "yes" if abs(rule["error"]) <= case.accuracy else "no"}
         )
-        print(made[-1], flush=True)
-    return made
+        print(row, flush=True)
+        yield row
