@@ -8,6 +8,7 @@ environment variables TAMAAS and GETFEM name Pythons that have these peers.
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -80,10 +81,14 @@ def report(made: dict[str, list[Row]]) -> None:
         kind: max(row["cpu"] for row in one if row["with"] == kind)
         for kind in ("all models", "meshes")
     }
+    runs = Counter((row["seed"], row["scene"]) for row in made["unseen"])
     text = template(__file__).format(
         good=len(good),
         count=len(rule),
         accurate=sum(row["meets"] == "yes" for row in rule),
+        strict=sum(row["meets"] == "yes" and row["lucky ratio"] <= 2 for row in rule),
+        lucky=sum(row["lucky ratio"] > row["ratio"] for row in rule),
+        meshes_tried=f"{min(runs.values())} to {max(runs.values())}",
         missed=words or "none",
         most=most["all models"],
         meshes=most["meshes"],
