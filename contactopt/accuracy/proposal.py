@@ -20,6 +20,9 @@ its energy, and of the pressure. There n counts elements of size h along the sur
 
 The points of a half-space under a disc fill an area with steps along its edge, whose mean distance
 from the circle falls like 1 / n: so do the errors of the approach and of the zone of stick.
+
+Under a flat punch elements shrink towards the corner. At a zone of stick that ends at a share c of
+the half-width they are 2 sqrt(1 - c) / n long, so that the error of c grows like (1 - c) / c^2.
 """
 
 from collections.abc import Callable
@@ -30,6 +33,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.special import ellipk, ellipkm1
 
 from contactopt.bodies.assembled_elastic import AssembledElastic
 from contactopt.coupling.posed import Posed
@@ -53,7 +57,9 @@ POISSON = 0.3  # Poisson's ratio of the scenes with these constants
 # around a contact in three dimensions many points say where the stick zone ends, and their errors
 # cancel
 AROUND = {"stick": 0.3}
-DISC = {"approach": 0.12, "stick": 0.12}  # error times n of a disc on the points of a half-space
+DISC = {"approach": 0.12, "stick": 0.25}  # error times n of a disc on the points of a half-space
+# of (1 - c) / c^2, where this is more than one; share of stick for which points under a disc do
+SMALL, MOST = 0.73, 0.75
 # seconds of a solution on one core: the first without regard to the mesh, the second times n^2;
 # of a half-space by (three dimensions?, friction?)
 POINTS = {
@@ -96,6 +102,7 @@ class ContactFacts:
     solid     whether the scene has three dimensions
     friction  whether there is friction
     poisson   the largest Poisson's ratio of the bodies, in plane stress nu / (1 + nu)
+    stuck     share c of the half-width that sticks, where the edge is a corner
     turn      length of the surface that is modelled over its radius, where the edge is 'none'
     unknowns  of the mesh with n linear elements, infinite where it cannot be made
     """
@@ -106,13 +113,15 @@ class ContactFacts:
     solid: bool = False
     friction: bool = False
     poisson: float = POISSON
+    stuck: float = 1.0
     turn: float = pi / 2
     unknowns: Callable[[int], float] = lambda n: 11.0 * n**2  # of a half-space
 
     def elements(self, quantity: str, degree: int, accuracy: float) -> int | None:
         """How many an accuracy needs; None where there is no rule."""
         if self.edge == "corner" and degree == 0:
-            steps = DISC.get(quantity) if self.solid else None
+            few = quantity == "stick" and self.stuck < MOST
+            steps = DISC.get(quantity) if self.solid and not few else None
             return None if steps is None else ceil(SAFETY * steps / accuracy)
         own = CONSTANTS.get((self.edge, degree), {}).get(quantity)
         if own is None:
@@ -125,7 +134,9 @@ class ContactFacts:
                 own *= max(1.0, self.power - 1) ** 2
             else:
                 return None
-        if self.edge == "none":
+        if self.edge == "corner" and quantity == "stick":
+            own *= max(1.0, SMALL * (1 - self.stuck) / self.stuck**2)
+        elif self.edge == "none":
             own *= self.turn**2 * max(1.0, _volume(self.poisson) / _volume(POISSON))
         elif degree == 1 and quantity in ("pressure", "approach"):
             own *= max(1.0, (1 + _volume(self.poisson)) / (1 + _volume(POISSON)))
@@ -143,6 +154,25 @@ class ContactFacts:
 def _volume(nu: float) -> float:
     """The uniaxial modulus over 2 G."""
     return (1 - nu) / (1 - 2 * nu)
+
+
+def stuck_share(mu: float, nu: float, plane: bool) -> float:
+    """The share c of the half-width of a rigid flat punch that sticks, to 20 % that of Spence.
+
+    K(sqrt(1 - c^2)) / K(c) is proportional to beta / mu, with the complete elliptic integral K and
+    Dundurs' beta = (1 - 2 nu) / (2 - 2 nu).
+    """
+    from scipy.optimize import brentq
+
+    wanted = (1.13 if plane else 0.78) / (2 * _volume(nu)) / mu
+    low, high = 1e-3, 1 - 1e-9
+
+    def excess(c: float) -> float:
+        return float(ellipkm1(c**2) / ellipk(c**2)) - wanted
+
+    return (
+        low if excess(low) < 0 else high if excess(high) > 0 else float(brentq(excess, low, high))
+    )
 
 
 def propose(
@@ -190,6 +220,9 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
     if bodies:
         unknowns = partial(unknowns_of, scene)
         meshed = {"poisson": _poisson(scene), "turn": turn_of(scene, made), "unknowns": unknowns}
+    mu = scene.pairs[0].mu
+    if edge == "corner" and bodies and isinstance(mu, float) and mu > 0:
+        meshed["stuck"] = stuck_share(mu, meshed["poisson"], scene.kind != "axisymmetric")
     flat = all(part.curve is None for part in scene.parts if isinstance(part, Part))
     meshes = (1, 2) if scene.dim == 2 else ()
     power = power_of(own.positions, own.gap, width) if edge == "free" else 2.0

@@ -82,12 +82,14 @@ def report(made: dict[str, list[Row]]) -> None:
         for kind in ("all models", "meshes")
     }
     runs = Counter((row["seed"], row["scene"]) for row in made["unseen"])
+    before = stored(NAME, "before")  # by the rule that did not know the share of stick
     text = template(__file__).format(
         good=len(good),
         count=len(rule),
         accurate=sum(row["meets"] == "yes" for row in rule),
+        before=len(before),
+        before_good=sum(r["meets"] == "yes" and r["ratio"] <= 2 for r in before),
         strict=sum(row["meets"] == "yes" and row["lucky ratio"] <= 2 for row in rule),
-        lucky=sum(row["lucky ratio"] > row["ratio"] for row in rule),
         meshes_tried=f"{min(runs.values())} to {max(runs.values())}",
         missed=words or "none",
         most=most["all models"],
