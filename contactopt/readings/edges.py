@@ -303,7 +303,7 @@ def stick_width(reduction: Reduction, solution: Solution, zone: Read) -> Read:
     problem, r = reduction.problem, solution.reactions
     if not problem.law.sticking(r).any():
         return stick_edge(reduction.scene, problem, r)
-    slip = problem.displacements(r, solution.multipliers)[:, 1:]
+    slip = reduction.moved(solution)[:, 1:]
     return stick_edge(reduction.scene, problem, r, slip, zone)
 
 

@@ -37,8 +37,8 @@ def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> 
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
         points = np.hstack([points, points - 2 * n * apart])
         forces = np.hstack([forces, forces - 2 * n * (plane.inward @ forces)]) / 2
-    acting_there = np.flatnonzero(np.any(forces, axis=0))
-    points, forces = points[:, acting_there], forces[:, acting_there]
+    some = np.any(forces, axis=0)
+    points, forces = (np.compress(some, each, axis=1) for each in (points, forces))
     x, f = (np.pad(each, ((0, 3 - len(each)), (0, 0))) for each in (points, forces))
     moment = np.cross(x, f, axis=0).sum(axis=1)
     return Resultant(forces.sum(axis=1), moment if len(points) == 3 else moment[2:])
