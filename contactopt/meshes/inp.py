@@ -360,9 +360,9 @@ class Scope:
             if last < first or step < 1:
                 raise block.fail("a range needs its first and last number and a step", line)
             by = self._of_instance(block, line)[1]
-            mine.update(dict.fromkeys(n + by for n in range(first, last + 1, step)))
-            ends: Named = dict.fromkeys((first + by, last + by), (block, line))
-            mine.update(ends)
+            own = range(first + by, last + by + 1, step)
+            mine.update(dict.fromkeys(own))
+            mine.update(dict.fromkeys((own[0], own[-1]), (block, line)))
         return mine
 
     def _of_instance(self, block: Block, line: int | None) -> tuple[Scope, int]:
