@@ -17,7 +17,6 @@ import docstrings
 import generate
 import lectures
 import museum
-
 from jupyter_client.connect import ConnectionFileMixin
 
 import contactopt
