@@ -4,7 +4,7 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.elements import weight_at
+from contactopt.bodies.elements import weight_at, with_jacobians
 from contactopt.bodies.fields import PLACES, Fields, Validity, von_mises
 from contactopt.defaults import ROUNDED
 from contactopt.meshes.cells import SHAPES, second_order, straight
@@ -160,12 +160,18 @@ def added_work(
 
 def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
     """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
-    field = basis.interpolate(U)
-    gradient, hoop = np.asarray(field.grad), None
+    places, shape, dim = basis.X, basis.elem.elem, len(basis.mesh.p)
+    elements = slice(None) if basis.tind is None else basis.tind
+    values, slopes = zip(*(shape.lbasis(places, i) for i in range(basis.Nbfun // dim)))
+    own = U[basis.element_dofs].reshape(len(values), dim, -1)
+    mapping = with_jacobians(basis.mapping, places, elements)
+    local = np.einsum("iae,ibq->abeq", own, np.stack(slopes), optimize=True)
+    inverse = np.asarray(mapping.invDF(places, tind=basis.tind))
+    gradient, hoop = np.einsum("abeq,bceq->aceq", local, inverse), None
     if body.weight[1]:  # u_r / r, on the axis its limit
         r = np.asarray(basis.global_coordinates())[0]
         away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
-        hoop = np.divide(np.asarray(field)[0], r, where=away, out=limit)
+        hoop = np.divide(own[:, 0].T @ np.stack(values), r, where=away, out=limit)
     return stress_of(body.kind, body.kind.constants(body.material), gradient, hoop)
 
 
