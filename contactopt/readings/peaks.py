@@ -38,6 +38,7 @@ class Peak:
     body, elements  where it lies inside a body: the number of the body and the elements around it
     sources, slopes  (s,) numbers of all contacts that were read, and the derivatives of a pressure
                      by the normal forces there [1 / area]
+    drop       by which share of the value it falls to the least of the contacts around it [-]
     """
 
     value: float
@@ -49,6 +50,7 @@ class Peak:
     elements: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
     sources: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
     slopes: np.ndarray = field(default_factory=lambda: np.empty(0))
+    drop: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,9 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     for top in (i for i in maxima(seen, largest_around(problem, seen)) if seen[i] > 0):
         peak = _fitted_top(problem, pressure, usable, top)
         uncertainty = peak.uncertainty + noise / float(problem.areas[top])
-        found.append(replace(peak, uncertainty=uncertainty))
+        near = around(problem, top)
+        drop = 1.0 - float(seen[near[usable[near]]].min() / seen[top])
+        found.append(replace(peak, uncertainty=uncertainty, drop=drop))
     found.sort(key=lambda peak: -peak.value)
     return Reading(found[0].value, found[0].uncertainty, tuple(found))
 
