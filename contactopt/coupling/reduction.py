@@ -285,7 +285,7 @@ def reduce_bodies(
 
     Raises
     ------
-    TooDear : Where a budget of work is open (contactopt.linear.budget) and too low.
+    TooDear : If this takes more work than an open budget allows (contactopt.linear.budget).
     """
     made = made or posed(scene, elements, zone, Q, coupling)
     assembled, couplings, maps, planes, spent = made
