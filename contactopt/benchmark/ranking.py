@@ -41,8 +41,8 @@ JOINED = {
 
 
 def factors(table: pd.DataFrame) -> dict[str, tuple[float, str]]:
-    """For each machine but the one of most rows, what its times are divided by, and how that was
-    measured; nan where nobody knows.
+    """The factor by which the times of each other machine are divided, to compare them with those
+    of the machine that has most rows, and how it was measured; nan where it is unknown.
 
     Runs that were made on both give the factor, a geometric mean. Without such runs it is the ratio
     of the calibrations, if the same methods ran on both.

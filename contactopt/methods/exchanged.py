@@ -39,8 +39,8 @@ HARDER, ROUNDS, NEWTON, EPS = 10.0, 12, 60, 1e-14
 
 
 def may(problem: InterfaceProblem) -> bool:
-    """Whether contacts are at one place, or contacts of two pairs are neighbours: within three
-    times the largest spacing.
+    """Whether two contacts lie at one place, or contacts of two pairs are nearer to each other than
+    three times the largest spacing.
     """
     if problem.shared_places:
         return True

@@ -227,7 +227,9 @@ class InterfaceProblem:
 
     @cached_property
     def shared_places(self) -> list[np.ndarray]:
-        """The contacts at each place that has several, if the pairs have names."""
+        """The groups of contacts that lie at one place. Empty for a problem whose pairs have no
+        names.
+        """
         x = self.coordinates
         if x.shape[1] != self.contacts or self.contacts < 2 or self.pairs[0].name == UNNAMED:
             return []

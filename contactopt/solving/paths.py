@@ -130,7 +130,7 @@ class PathResult:
 
     @property
     def solutions(self) -> list[Solution]:
-        """Those of all states, and that of the step that failed."""
+        """The solutions of all states, and that of the step that failed."""
         failed = [] if self.failed is None else [self.failed]
         return [*(state.solution for state in self.states), *failed]
 

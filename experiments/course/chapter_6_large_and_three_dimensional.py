@@ -66,12 +66,15 @@ for way, name in (
     ((0, 30, 0), "$t_2$"),
 ):
     ax.quiver(
-        48, -48, 0, *way, color="k", lw=1.8, arrow_length_ratio=0.25, zorder=3
+        -40, -44, 0, *way, color="k", lw=1.8, arrow_length_ratio=0.25, zorder=3
     )
-    ax.text(48 + 1.2 * way[0], -48 + 1.2 * way[1], 1.2 * way[2], name, zorder=3)
-ax.set(
-    xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", box_aspect=(1, 1, 0.8)
-)
+    ax.text(
+        -40 + 1.2 * way[0], -44 + 1.2 * way[1], 1.2 * way[2], name, zorder=3
+    )
+ax.text(8, -4, -9, "20 mm", zorder=3)
+ax.text(22, 22, 18, "40 mm", zorder=3)
+ax.set_box_aspect((1, 1, 0.8), zoom=1.15)
+ax.set_axis_off()
 ax.view_init(elev=22, azim=-58)
 
 # %% [markdown]

@@ -33,7 +33,8 @@ class Kinks(NamedTuple):
 class Law:
     """What all laws share.
 
-    A law of its own needs `bound` and `nearest_derivative`; the rest has defaults.
+    A law of its own needs `bound` and `nearest_derivative`, and `slope` where the bound depends on
+    the normal force; the rest has defaults.
     The fields of a law are its parameters: arrays (k,) of numbers that are not negative, or one
     number for all contacts. Methods ask a law for these properties, never for its name:
 
@@ -122,6 +123,10 @@ class Law:
         """(k,) the largest |r_t| [force] in any direction under normal forces r_n (k,)."""
         raise NotImplementedError
 
+    def slope(self, r_n: np.ndarray) -> np.ndarray:
+        """(k,) the derivative of `bound` by the normal force."""
+        return np.zeros(len(r_n))
+
     def bound_along(self, r: np.ndarray) -> np.ndarray:
         """(k,) the largest |r_t| [force] in the direction of r_t, for forces r (k, dim)."""
         return self.bound(r[:, 0])
@@ -139,7 +144,10 @@ class Law:
 
     def project(self, y: np.ndarray) -> Projected:
         """P(y) (k, dim) of r = P(r - rho u), and generalised derivatives (k, dim, dim)."""
-        return self.nearest_derivative(y, y[:, 0])
+        P, D = self.nearest_derivative(y, y[:, 0])
+        slips = lengths(y[:, 1:]) > self.bound(y[:, 0])
+        D[:, 1:, 0] += (slips * self.slope(y[:, 0]))[:, None] * unit(y[:, 1:])
+        return P, D
 
     def mapped(self, y: np.ndarray) -> np.ndarray:
         """P(y) (k, dim) of `project` alone."""
