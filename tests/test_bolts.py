@@ -110,7 +110,7 @@ def test_contact_carries_the_force_of_the_bolt(mesh, kind, tilting):
 
 
 def test_rounding_in_the_normal_of_a_bolt_moves_no_face():
-    """A stiff head on a layer that nothing holds sideways: a mean normal of (1e-17, 1) is (0, 1)."""
+    """A stiff head stays where nothing holds it: a mean normal of (3e-17, 1) is (0, 1)."""
     low, high = (
         Face(np.array([x, 1.0]), 1.0, np.zeros(2), ("x", "y"), frozenset()) for x in (3e-17, 1e-6)
     )
