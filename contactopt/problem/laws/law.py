@@ -214,7 +214,7 @@ class Law:
         return self._mapped(lambda parameter: parameter[contacts])
 
     def lumped(self, first: np.ndarray, count: int) -> Law:
-        """The law of groups of `count` contacts that act as one, each with the law of its `first`."""
+        """The law of groups of `count` contacts that act as one, each with that of its `first`."""
         return self.select(first)
 
     def spread(self, k: int) -> Self:
