@@ -1,7 +1,7 @@
 """Who is first: methods compared at the accuracy that they reach, not at the one asked for.
 
 The runs of a method on a problem are points: median time and worst
-certificate of the repeats, one for each tolerance asked. The time to an accuracy is read off their
+certificate of the repeats, one for each tolerance. The time to an accuracy is read off their
 front, straight in logarithms; what does not reach it counts as its time limit, and times below
 NOISE count as NOISE. A problem that a method refuses at every tolerance is not applicable to it: no
 failure, and nobody is ranked there. A ranking compares on the problems that all entrants take.
