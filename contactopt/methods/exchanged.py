@@ -40,8 +40,8 @@ HARDER, ROUNDS, NEWTON, EPS = 10.0, 12, 60, 1e-14
 
 
 def may(problem: InterfaceProblem) -> bool:
-    """Whether contacts are at one place, or contacts of two pairs are neighbours: within three
-    times the largest spacing.
+    """Whether two contacts lie at one place, or contacts of two pairs are nearer to each other than
+    three times the largest spacing.
     """
     if len(problem.pairs) < 2 and problem.pairs[0].name == UNNAMED:
         return False
