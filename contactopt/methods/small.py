@@ -48,14 +48,13 @@ def arrays_of(problem: InterfaceProblem) -> tuple[int, list[np.ndarray]] | None:
     Q, q, law = problem.Q, problem.q, problem.law
     if type(law) is not Coulomb or not len(q) or len(problem.s):
         return None
-    if gauss_seidel.compiled("solved") is None:
+    kind = form(Q)
+    if gauss_seidel.compiled("solved") is None or kind not in ("array", "sparse"):
         return None
-    if isinstance(Q, np.ndarray):
-        rows = gauss_seidel.NONE, gauss_seidel.NONE, np.ascontiguousarray(Q)
-    elif form(Q) == "sparse":
+    if kind == "sparse":
         rows = Q.indptr.astype(np.int64), Q.indices.astype(np.int64), Q.data
     else:
-        return None
+        rows = gauss_seidel.NONE, gauss_seidel.NONE, np.ascontiguousarray(Q)
     return q.shape[1], [*rows, np.ascontiguousarray(law.mu), np.ascontiguousarray(q)]
 
 
