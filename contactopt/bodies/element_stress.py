@@ -1,5 +1,7 @@
 """Displacement and stress inside a body of finite elements, computed element by element."""
 
+from collections.abc import Callable
+
 import numpy as np
 import skfem
 
@@ -8,10 +10,11 @@ from contactopt.bodies.elements import weight_at, with_jacobians
 from contactopt.bodies.fields import PLACES, Fields, Validity, von_mises
 from contactopt.defaults import ROUNDED
 from contactopt.meshes.cells import SHAPES, second_order, straight
-from contactopt.scenes.kinds import Kind
+from contactopt.scenes.kinds import Constants
 
 # elements whose shape functions are evaluated at a time, which bounds the memory that they take
 BLOCK = 2000
+Force = Callable[[np.ndarray], np.ndarray]  # per volume (dim, m), at places (dim, m)
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0.0) -> Validity:
@@ -141,11 +144,11 @@ def _product(body: Assembly, first: np.ndarray, second: np.ndarray) -> np.ndarra
 
 
 def added_work(
-    body: Assembly, volumes: np.ndarray, load: np.ndarray, U: np.ndarray, *others: np.ndarray
+    body: Assembly, volumes: np.ndarray, force: Force, U: np.ndarray, *others: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """For each W of the others what volumes (elements,) [length^dim] with the force per volume
-    `load` (dim,), added to the elements of a body, would work (elements,) [force length]:
-    load . W - s(U) : C^-1 : s(W), by the means of the elements.
+    force(x) (dim, elements), added to the elements of a body, would work (elements,) [force
+    length]: force . W - s(U) : C^-1 : s(W), by the means of the elements.
     """
     basis = body.basis
     centre = np.asarray(basis.global_coordinates()).mean(axis=2)
@@ -153,7 +156,7 @@ def added_work(
     own = stress_in(body, basis, U).mean(axis=3)
     for W in others:
         stress = own if W is U else stress_in(body, basis, W).mean(axis=3)
-        moved = np.tensordot(load, np.asarray(basis.interpolate(W)).mean(axis=2), 1)
+        moved = np.sum(force(centre) * np.asarray(basis.interpolate(W)).mean(axis=2), axis=0)
         found.append(np.asarray((moved - _product(body, own, stress)) * measure))
     return tuple(found)
 
@@ -172,18 +175,16 @@ def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarr
         r = np.asarray(basis.global_coordinates())[0]
         away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
         hoop = np.divide(own[:, 0].T @ np.stack(values), r, where=away, out=limit)
-    return stress_of(body.kind, body.kind.constants(body.material), gradient, hoop)
+    return stress_of(body.kind.constants(body.material), gradient, hoop)
 
 
-def stress_of(
-    kind: Kind, constants: tuple[float, float], gradient: np.ndarray, hoop: np.ndarray | None
-) -> np.ndarray:
+def stress_of(constants: Constants, gradient: np.ndarray, hoop: np.ndarray | None) -> np.ndarray:
     """Stress (3, 3, e, q) of a gradient (dim, dim, e, q) and of a hoop strain, if there is one."""
-    lam, shear = constants
+    lam, shear, across = constants
     dim = len(gradient)
     strain = np.zeros((3, 3, *gradient.shape[2:]))
     strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
     if hoop is not None:
         strain[2, 2] = hoop
-    pressed = np.diag([1.0, 1.0, 0.0 if kind.stretches else 1.0])[:, :, None, None]
-    return np.asarray(2 * shear * strain + lam * np.trace(strain) * pressed)
+    pressed = np.diag([lam, lam, across])[:, :, None, None]
+    return np.asarray(2 * shear * strain + np.trace(strain) * pressed)

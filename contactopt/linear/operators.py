@@ -79,7 +79,9 @@ class InterfaceOperator(LinearOperator):
         return self.counter.total
 
     def knowing(self, x: np.ndarray, X: Stacked) -> InterfaceOperator:
-        """The operator whose products begin with X of the bodies, close to theirs."""
+        """The operator whose products start from displacements X of the bodies that are close to
+        theirs.
+        """
         known = copy(self)
         known.known = x.copy(), X
         return known

@@ -130,9 +130,9 @@ def without_rounding(V: np.ndarray) -> np.ndarray:
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """The components (k dim,) that neither forces nor multipliers nor q move, and whose forces move
-    nothing, as a mask. A normal force that bounds the friction of a component that moves is none of
-    them: it matters.
+    """The mask (k dim,) of components that neither forces nor multipliers nor q move, and whose
+    forces move nothing. A normal force that bounds the friction of a moving component is not among
+    them.
     """
     d, law = np.abs(diagonal(problem.Q)), problem.law
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]

@@ -18,7 +18,7 @@ from contactopt.problem import InterfaceProblem
 
 
 def eliminated(level: Level, at: Evaluation) -> Evaluation:
-    """Solve alone the contacts that make most of the residual; returns errors and forces."""
+    """Solve alone the contacts with most of the residual; returns errors and forces."""
     some = _worst(level, at)
     if not len(some) or len(level.components) < level.kernel.dim:
         return at
