@@ -169,7 +169,8 @@ for node, color in ((order[4], "C0"), (order[18], "C2")):
     column = Q[::2, 2 * node]
     ax.plot(x[order], column[order], color + ".-")
     arrow(ax, (x[node], -0.2), (x[node], -0.03), "1 N", color)
-_ = ax.set(xlabel="x [mm]", ylabel="normal displacement [mm]", ylim=(-0.22, 0.58))
+ax.set(xlabel="x [mm]", ylabel="normal displacement [mm]")
+_ = ax.set(ylim=(-0.22, 0.58))
 
 # %% [markdown]
 # ## Dual: forces on the contact alone
