@@ -32,6 +32,7 @@ It ends where the driver's certificate or limits say so.
 import logging
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import count
 from typing import ClassVar
 
@@ -46,7 +47,7 @@ from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equatio
 from contactopt.methods.kernels.gauss_seidel import Sweeps
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.methods.kernels.states import StateTree, can
+from contactopt.methods.kernels.states import Point, StateTree, can
 from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
@@ -174,9 +175,17 @@ class _Robust:
         self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         self.evaluate = coulomb_equations(problem).evaluate
-        few = can(problem) and problem.contacts <= constants.MOST_STATES[problem.dim]
-        self.tree, self.met = StateTree(problem.explicit()) if few else None, False
-        self.branches = self.tree.points() if self.tree else iter(())
+        self.met = False
+
+    @cached_property
+    def tree(self) -> StateTree | None:
+        """The tree over the states of few contacts."""
+        few = self.problem.contacts <= constants.MOST_STATES[self.problem.dim]
+        return StateTree(self.problem.explicit()) if few and can(self.problem) else None
+
+    @cached_property
+    def branches(self) -> Iterator[Point | None]:
+        return self.tree.points() if self.tree else iter(())
 
     def better(self, *points: Iterate) -> Iterate:
         """The point with the least residual, the first of equal ones."""

@@ -108,6 +108,9 @@ COARSE_ENOUGH = 3e-3  # residual at which a coarse grid has done its work, over 
 COARSEST_ENOUGH = 1e-4  # that of the coarsest grid, from which the others must not be led astray
 COARSE_STEPS = 30  # Newton steps on a coarse grid
 COARSE_TRIES = 80  # iterates of the default method on the coarsest grid, where Newton's steps fail
+# order of convergence that the accuracy of steps allows for: the contacts that change their state
+# spoil more than products can gain
+GRID_ORDER = 1.5
 CLOSER = 0.1  # residual of a given start that is taken, over that of the coarse grids' answer
 LEAST_SYMBOL = 1e-3  # value of the symbol that is inverted, over its median
 LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product

@@ -17,6 +17,7 @@ from contactopt.checks import place_words
 from contactopt.linear.operators import form, has_entries
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem, Solution, natural_map_residual
+from contactopt.problem.chart import UNNAMED
 from contactopt.problem.scaling import immovable
 
 # Contacts around a place that exchange forces, too: on quadratic elements an exchange falls to a
@@ -42,6 +43,8 @@ def may(problem: InterfaceProblem) -> bool:
     """Whether two contacts lie at one place, or contacts of two pairs are nearer to each other than
     three times the largest spacing.
     """
+    if len(problem.pairs) < 2 and problem.pairs[0].name == UNNAMED:
+        return False
     if problem.shared_places:
         return True
     points = [problem.coordinates.T[pair.contacts] for pair in problem.pairs]

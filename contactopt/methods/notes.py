@@ -38,10 +38,15 @@ def collected() -> Iterator[list[str]]:
         _notes.reset(token)
 
 
+def dubious(problem: InterfaceProblem, solution: Solution) -> bool:
+    """Whether the certificate of few contacts leaves a doubt that is worth its cost."""
+    loose = solution.solved and solution.residual > EXACT
+    return loose and problem.contacts <= FEW and form(problem.Q) == "array"
+
+
 def remark(problem: InterfaceProblem, solution: Solution) -> None:
     """Say where the forces of a small problem may be far off although they are certified."""
-    at, loose = solution, solution.solved and solution.residual > EXACT
-    if not loose or problem.contacts > FEW or form(problem.Q) != "array":
+    if not dubious(problem, at := solution):
         return
     condition = amplification(problem, at.reactions, at.multipliers)
     if condition <= WEDGED or condition * at.residual <= MUCH:
