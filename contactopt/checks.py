@@ -41,7 +41,7 @@ def check_number(
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
     except (TypeError, ValueError, OverflowError):
         good = False
-    if isinstance(value, (str, np.ma.core.MaskedConstant)) or not good:
+    if not good:
         bounds = []
         if low > -np.inf:
             bounds.append(f"{'at least' if closed else 'greater than'} {low:g}")

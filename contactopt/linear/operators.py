@@ -162,9 +162,9 @@ Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or I
 
 def form(Q: Interface) -> Form:
     """How Q is known: as 'array' or 'sparse', or by products alone ('bodies' or 'convolution')."""
-    if isinstance(Q, InterfaceOperator):
-        return Q.form
-    return "sparse" if sp.issparse(Q) else "array"
+    if isinstance(Q, np.ndarray):  # most often
+        return "array"
+    return Q.form if isinstance(Q, InterfaceOperator) else "sparse"
 
 
 def has_entries(Q: Interface) -> bool:

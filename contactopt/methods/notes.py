@@ -51,12 +51,16 @@ def _nearly_singular(Q: np.ndarray) -> bool:
     return bool(singular or la.lapack.dpocon(factor, norm)[0] < DOUBTFUL)
 
 
+def dubious(problem: InterfaceProblem, solution: Solution) -> bool:
+    """Whether the certificate of few contacts leaves a doubt that is worth its cost."""
+    if not solution.solved or problem.contacts > FEW or form(problem.Q) != "array":
+        return False
+    return solution.residual > EXACT or _nearly_singular(np.asarray(problem.Q))
+
+
 def remark(problem: InterfaceProblem, solution: Solution) -> None:
     """Say where the forces of a small problem may be far off although they are certified."""
-    at = solution
-    if not at.solved or problem.contacts > FEW or form(problem.Q) != "array":
-        return
-    if at.residual <= EXACT and not _nearly_singular(np.asarray(problem.Q)):
+    if not dubious(problem, at := solution):
         return
     condition = amplification(problem, at.reactions, at.multipliers)
     error = condition * max(at.residual, np.finfo(float).eps)

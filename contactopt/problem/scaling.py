@@ -21,7 +21,8 @@ from contactopt.problem.interface_problem import InterfaceProblem
 class Scales:
     """Units in which a problem is dimensionless: force, length, and one length per multiplier.
 
-    stretch  (k, dim - 1, dim - 1) what takes its tangential forces back (`isotropic`), or None
+    stretch  (k, dim - 1, dim - 1) the S of `isotropic`, which multiplies tangential forces to
+             get those of the problem; None where friction is the same in all directions
     basis    (p, m) of the multipliers that the dimensionless problem has, or None for all
     """
 

@@ -23,7 +23,7 @@ def eliminated(level: Level, at: Evaluation) -> Evaluation:
     if not len(some) or len(level.components) < level.kernel.dim:
         return at
     (r, lam), Q = at.point, level.kernel.entries(some)
-    moved = (level.product(r) + level.V @ lam + level.q)[:, some].T
+    moved = at.moved[:, some].T
     begin = np.ascontiguousarray(r[:, some].T)
     q = moved - (Q @ begin.ravel()).reshape(begin.shape)
     found = _solution(InterfaceProblem(Q, q, level.law.select(some)), begin)
