@@ -71,9 +71,9 @@ class ElementErrors:
 
 
 def misfit(found: Sequence[ElementErrors]) -> float:
-    """By how much the last two refinements changed the value with its estimated error, which exact
-    estimates would not [its unit]; `found` belong to the last three meshes. The earlier change
-    counts less, as the estimated error has fallen since.
+    """By how much the last two refinements changed the sum of the value and its estimated error
+    [its unit]. Exact estimates would not change it. `found` belong to the last three meshes. The
+    earlier change counts less, as the estimated error has fallen since.
     """
     changes = np.abs(np.diff([errors.value + errors.total for errors in found]))
     if len(changes) > 1:

@@ -69,7 +69,7 @@ class Worker:
         return row
 
     def run(self, task: Task, hopeless: bool = False) -> dict[str, Any]:
-        """The row of this run, whatever happens to the processes; a `hopeless` one is not made."""
+        """The row of a run, whatever happens to the processes; a `hopeless` one is not started."""
         row = blank(task)
         self._build(task)
         if (label := task.run.problem.label) in self.broken:

@@ -108,12 +108,12 @@ class Reduction:
 
     @property
     def gap(self) -> np.ndarray:
-        """(k,) initial gap of all contacts [length]."""
+        """The initial gap (k,) of all contacts [length]."""
         return np.concatenate([made.gap for made in self.couplings])
 
     @property
     def frames(self) -> np.ndarray:
-        """(k, dim, dim) rows n, t1[, t2] of all contacts."""
+        """The directions n, t1[, t2] of all contacts as rows (k, dim, dim)."""
         return np.concatenate([made.frames for made in self.couplings])
 
     @property
@@ -285,7 +285,7 @@ def reduce_bodies(
 
     Raises
     ------
-    TooDear : Where a budget of work is open (contactopt.linear.budget) and too low.
+    TooDear : If this takes more work than an open budget allows (contactopt.linear.budget).
     """
     made = made or posed(scene, elements, zone, Q, coupling)
     assembled, couplings, maps, planes, spent = made

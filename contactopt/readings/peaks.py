@@ -121,7 +121,9 @@ def around(problem: InterfaceProblem, contact: int) -> np.ndarray:
 
 
 def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:
-    """Numbers of places whose size is the largest around, the largest first, not by rounding."""
+    """Numbers of the places that are the largest around, the largest first. Differences of the size
+    of rounding do not change the order.
+    """
     chosen = np.flatnonzero(sizes >= (1 - EQUAL) * largest)
     order = np.round(sizes[chosen] / (EQUAL * sizes.max(initial=0.0) or 1.0))
     return chosen[np.argsort(-order, kind="stable")[:MOST_PEAKS]]

@@ -102,8 +102,9 @@ def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Sol
 
 
 def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
-    """For the name of each pair the components of the force on its upper body, without their unit,
-    from the summary of a result: normal forces of a curved surface add up to more than it.
+    """For each pair, by its name, the components of the force on its upper body as words without a
+    unit, from the summary of a result. The normal forces of a curved surface add up to more than
+    this force.
     """
     axes = KINDS[summary["kind"]].components
     words = {}
