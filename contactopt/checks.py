@@ -41,7 +41,7 @@ def check_number(
         good = isfinite(value) and (low <= value if closed else low < value) and value < high
     except (TypeError, ValueError, OverflowError):
         good = False
-    if isinstance(value, (str, np.ma.core.MaskedConstant)) or not good:
+    if not good:
         bounds = []
         if low > -np.inf:
             bounds.append(f"{'at least' if closed else 'greater than'} {low:g}")
@@ -135,7 +135,7 @@ def real_array(name: str, value: object) -> np.ndarray:
 
 def check_name(what: str, name: object) -> None:
     """Raise InputError unless a name can become a file's name in a folder, and can lead to no other
-    folder. The message says with `what` what has the name.
+    folder. The message begins with `what`, the thing that has this name.
 
     Refused are names that are no text, empty, longer than 100 characters, or made of dots only;
     names with a slash, a backslash, a colon or a character that cannot be printed; names that begin
@@ -179,7 +179,7 @@ def meant(name: str, known: Iterable[str]) -> str:
 
 @contextmanager
 def said_once() -> Iterator[None]:
-    """Within, what is wrong with a body or a pair is said once, and not of each of its meshes."""
+    """Within this block a remark on a body or a pair is made once, not for each of its meshes."""
     said: set[Any] = set()
 
     def new(record: logging.LogRecord) -> bool:

@@ -21,10 +21,3 @@ def lame(material: Material) -> tuple[float, float]:
     """Lame's parameters lambda = E nu / ((1 + nu) (1 - 2 nu)) and G = E / (2 (1 + nu)) [stress]."""
     E, nu = material.E, material.nu
     return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
-
-
-def lame_by_poisson(material: Material) -> tuple[float, float]:
-    """The derivatives of lambda and G by Poisson's ratio [stress]; those by E: (lambda, G) / E."""
-    E, nu = material.E, material.nu
-    below = (1 + nu) * (1 - 2 * nu)
-    return E / below + E * nu * (1 + 4 * nu) / below**2, -E / (2 * (1 + nu) ** 2)

@@ -72,12 +72,12 @@ class Outcome:
 
     @property
     def pressure(self) -> np.ndarray:
-        """Contact pressure at the contact nodes, (k,) [stress]."""
+        """The contact pressure (k,) at the contact nodes [stress]."""
         return np.asarray(self.shown.reactions[:, 0] / self.problem.areas)
 
     @property
     def traction(self) -> np.ndarray:
-        """Tangential traction on the upper body, (k,) or in 3D (k, 2) [stress]."""
+        """The tangential traction on the upper body [stress], (k,) or in 3D (k, 2)."""
         return squeeze(self.shown.reactions[:, 1:] / self.problem.areas[:, None])
 
 

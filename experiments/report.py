@@ -59,8 +59,8 @@ def write(
 ) -> None:
     """Write reports/name/ with its report.
 
-    `text` is Markdown in which {table} stands for the table of that name; `command` is the module
-    that makes it, by default experiments.questions.name.
+    `text` is Markdown in which {table} stands for the table of that name; figures that it does not
+    show come last. `command` is the module that makes it, by default experiments.questions.name.
     """
     folder = REPORTS / name
     folder.mkdir(parents=True, exist_ok=True)
@@ -71,7 +71,7 @@ def write(
     for stem, rows in tables.items():
         body = body.replace(f"{{{stem}}}", markdown(rows))
     path = folder / "report.md"
-    pictures = "\n\n".join(f"![{stem}]({stem}.png)" for stem in figures)
+    pictures = "\n\n".join(f"![{s}]({s}.png)" for s in figures if f"]({s}.png)" not in body)
     made = command or f"experiments.questions.{name}"
     foot = f"Made by `python -m {made}`.\nEnvironment: {environment()}."
     path.write_text(f"# {title}\n\n{body}\n\n{pictures}\n\n{foot}\n".replace("\n\n\n\n", "\n\n"))

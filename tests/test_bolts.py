@@ -10,6 +10,7 @@ import contactopt
 from contactopt import Bolt, InputError, Material, Part, Plate, Scene, Support, Traction
 from contactopt.holding.grown_load import load_rows
 from contactopt.readings.resultants import columns, pair_resultants
+from contactopt.scenes.loads.load import Face
 from contactopt.scenes.parameters import parameter
 from contactopt.scenes.scene_files import read_scene_file
 from contactopt.simplification.search import simplify
@@ -106,6 +107,15 @@ def test_contact_carries_the_force_of_the_bolt(mesh, kind, tilting):
     assert np.allclose(own.force, F * np.eye(len(axes))[-1], rtol=0, atol=1e-9 * F)
     assert np.allclose(one.solution.reactions, two.solution.reactions, rtol=0, atol=1e-8 * F)
     assert columns(one.reduction, one.solution)["bolt:m4"] == F
+
+
+def test_rounding_in_the_normal_of_a_bolt_moves_no_face():
+    """A stiff head stays where nothing holds it: a mean normal of (3e-17, 1) is (0, 1)."""
+    low, high = (
+        Face(np.array([x, 1.0]), 1.0, np.zeros(2), ("x", "y"), frozenset()) for x in (3e-17, 1e-6)
+    )
+    end = clamp(bolts=(Bolt(FACES, F, tilting=False),)).bolt_ends["bolt1"][0][1]
+    assert end.on(low).force == {"x": 0.0, "y": -F} and end.on(high).force["x"] == -1e-6 * F
 
 
 @pytest.mark.parametrize("bolt", [

@@ -141,6 +141,9 @@ MEANT = {
         GROWN + "*NSET, NSET=A\n1,2\n*NSET, NSET=S\nA, 3\n*NSET, NSET=A\n11\n", 3, {"S": 2}, 8,
     ),
     "range with a gap": (GROWN + "*NSET, NSET=S, GENERATE\n1,11,1\n", 3, {"S": 4}, 8),
+    "range whose step misses the end": (
+        GROWN + "*NSET, NSET=S, GENERATE\n1,3,4\n2,2\n", 3, {"S": 1}, 8,
+    ),
     "points": (
         ONE + RIGHT + "*ELEMENT, TYPE=SPRINGA, ELSET=K\n7,1,3\n*ELEMENT, TYPE=MASS, ELSET=M\n8,1\n"
         "*NSET, NSET=AT, ELSET=K\n*ELEMENT,TYPE=D\n11,0,1,2\n",
@@ -308,6 +311,14 @@ def test_an_included_file_may_hold_data_alone(tmp_path):
     (tmp_path / "m.txt").write_text("*INCLUDE, INPUT=deck.inp\n")
     with pytest.raises(InputError, match="include each other"):
         load_mesh(path)
+
+
+def test_an_included_file_names_others_beside_the_first_file(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "a.inp").write_text("*INCLUDE, INPUT=sub/b.inp\n")
+    (tmp_path / "sub" / "b.inp").write_text(ONE)
+    (tmp_path / "deck.inp").write_text("*INCLUDE, INPUT=sub/a.inp\n" + RIGHT)
+    check(tmp_path / "deck.inp", "B", 1, {"S": 1}, 4)
 
 
 def test_a_node_that_is_there_twice_is_told(tmp_path, capsys):

@@ -215,3 +215,17 @@ def test_what_holds_for_every_load_does_not_know_the_load(q_n):
     )
     assert "uniqueness (but for the forces of held components) is not guaranteed" in normal
     assert "(but for the forces of held components) for every load and every mu" in tangential
+
+
+@pytest.mark.parametrize("apart", [1e-5, 1e-10, 1e-12, 1e-14])
+def test_forces_that_hardly_move_anything_are_remarked_on_however_small_the_residual(apart):
+    """Two contacts at one point, of which one has a soft spring of its own: rounding of q moves
+    the force from one to the other.
+    """
+    one, right = np.array([[1, 0.2], [0.2, 1]]), np.array([[1, 0], [0.7, 0]])
+    Q = np.block([[one, one], [one, one + apart * np.eye(2)]])
+    q = -(Q @ right.ravel()).reshape(2, 2)
+    answer = solve(InterfaceProblem(Q, q, mu=0.3), tol=1e-11)
+    assert answer.solved and answer.residual <= 1e-11
+    off = np.abs(answer.reactions - right).max()
+    assert ("nearly" in "".join(answer.notes)) == (off > 1e-3)

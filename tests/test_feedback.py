@@ -175,6 +175,9 @@ def test_numbers_of_every_type_are_numbers_and_digits_that_are_cut_off_are_nearl
         ("2.2", 5.3 / 6.2, "`Q_nt` is left out"),
         ("2.2", 13.7 / 8.4, "the matrix `Q` is confused with its inverse"),
         ("2.4", (0, 0.26, 0.26), "Number 3: This is the right number 2"),
+        ("3.5", (1, 1, 1), "less than half as large"),
+        ("5.5", (2.5, -1.0), "you added rho u_n"),  # (2.53, -1.01) has the same two digits
+        ("7.8", 0.04, "the distance from the cone"),
         ("5.5", (2.2, -0.88), "`rho` is left out everywhere"),
         ("5.9", (3, 0, 1.8, -1.6), "Numbers 1 and 3 and 4: This comes out if `mu * Q_nt` is left"),
         ("6.6", 0.0333, "the value of `p / E`"),

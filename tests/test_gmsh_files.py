@@ -260,3 +260,40 @@ def test_partitioned_files_of_gmsh_are_refused(gmsh, tmp_path):
     gmsh.write(str(tmp_path / "a.msh"))
     with pytest.raises(InputError, match="partition"):
         load_mesh(tmp_path / "a.msh")
+
+
+SQUARE = "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n$EndNodes\n"
+TEXT = (
+    "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"
+    + SQUARE
+    + ("$Elements\n3\n1 2 2 7 1 1 2 3\n2 2 2 7 1 1 3 4\n3 1 2 8 1 1 2\n$EndElements\n")
+)
+TEXT4 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 0\n" + (
+    "1 0 0 0 1 1 0 1 7 0\n$EndEntities\n$Nodes\n1 4 1 4\n2 1 0 4\n1\n2\n3\n4\n"
+    "0 0 0\n1 0 0\n1 1 0\n0 1 0\n$EndNodes\n$Elements\n1 2 1 2\n2 1 2 2\n1 1 2 3\n2 1 3 4\n"
+    "$EndElements\n"
+)
+
+
+@pytest.mark.parametrize("text", [TEXT, TEXT4])
+def test_files_written_by_hand_are_read_whole_or_refused(tmp_path, text):
+    """What a count passes over, what is there twice, and comments above the version."""
+    path = tmp_path / "a.msh"
+    for head in (
+        "",
+        "$Comments\n$Nodes of a square\n" + 300 * "made by hand " + "\n$EndComments\n",
+    ):
+        path.write_text(head + text)
+        mesh = load_mesh(path, "7")
+        assert volume(mesh) == pytest.approx(1) and mesh.nvertices == 4
+    wrong = {
+        "holds more than it counts": text.replace("$EndElements", "9 2 3 4\n$EndElements"),
+        "node 2 is there twice": text.replace("\n4\n1 0 0 0\n", "\n5\n2 9 0 0\n1 0 0 0\n").replace(
+            "1 4 1 4\n2 1 0 4\n1\n2\n3\n4\n", "1 5 1 4\n2 1 0 5\n1\n2\n3\n4\n2\n9 9 9\n"
+        ),
+        "two sections [$]Elements": text + "$Elements\n1\n9 2 2 7 1 2 3 4\n$EndElements\n",
+    }  # fmt: skip
+    for words, other in wrong.items():
+        path.write_text(other)
+        with pytest.raises(InputError, match=words):
+            load_mesh(path, "7")

@@ -25,6 +25,7 @@ from contactopt.methods.kernels import elimination
 from contactopt.methods.kernels.levels import Level
 from contactopt.methods.nested import Nested
 from contactopt.problem import dimensionless
+from contactopt.readings import peaks
 from contactopt.readings.peaks import largest_around, maxima
 from contactopt.scenes.rough_surfaces import self_affine
 
@@ -227,6 +228,20 @@ def test_odd_grids_and_strips():
         assert contactopt.solve(problem).solved
 
 
+def test_the_products_of_a_rough_surface_with_friction_do_not_grow_with_its_grid():
+    found = []
+    for n in (64, 256):
+        heights = self_affine((n, n), (10.0, 10.0), longest=2.5, shortest=0.625, slope=0.1)
+        above = Rigid("body", gap=heights.max() - heights, force={"z": -2.5, "x": 0.375})
+        below = HalfSpace("base", STEEL, (ticks(n), ticks(n)))
+        solution = contactopt.solve(
+            contactopt.reduce(Scene("rough", above, below, 0.3, kind="solid"))
+        )
+        assert solution.solved
+        found.append(solution.products)
+    assert max(found) <= 40  # 43 and 51 where GMRES measured preconditioned residuals
+
+
 def test_self_affine_surface():
     lengths = (10.0, 10.0)
     made = self_affine((64, 64), lengths, shortest=1.0, slope=0.2, seed=3)
@@ -362,6 +377,19 @@ def test_local_maxima_on_a_grid_are_those_among_the_nearest_contacts():
     tops = np.flatnonzero(pressure >= np.max(window, axis=0).ravel())
     best = tops[np.argsort(-pressure[tops])][:8]
     np.testing.assert_array_equal(maxima(pressure, largest_around(problem, pressure)), best)
+
+
+@pytest.mark.parametrize("width", [1, 2, 5])  # windows that are too small, among them
+def test_a_fit_in_a_window_of_the_grid_is_that_among_all_contacts(width, monkeypatch):
+    reduction = reduce_bodies(ball(31, law="frictionless", shear=0))
+    solution = contactopt.solve(reduction.problem)
+    found = []
+    for window in (width, 31):
+        monkeypatch.setattr(peaks, "WINDOW", window)
+        found.append(peaks.pressure_reading(reduction, solution))
+    assert (found[0].value, found[0].uncertainty) == (found[1].value, found[1].uncertainty)
+    for one, other in zip(*(reading.peaks for reading in found)):
+        np.testing.assert_array_equal(one.sources, other.sources)
 
 
 def test_the_phases_of_a_run_sum_to_its_total(tmp_path):

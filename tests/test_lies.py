@@ -233,9 +233,13 @@ def test_the_independent_check_can_fail():
         assert worst(problem, r) > 1e-2 and natural_map_residual(problem, r) > 1e-2
 
 
-@pytest.mark.parametrize("method", ["auto", "newton", "proximal", "nsgs", "admm", "apg"])
-def test_methods_solve_a_packing_and_keep_it_sparse(method, monkeypatch):
+@pytest.mark.parametrize(
+    "method", ["auto", "auto without sweeps", "newton", "proximal", "nsgs", "admm", "apg"]
+)
+def test_methods_solve_a_packing_and_keep_it_sparse(method, monkeypatch, request):
     problem = packing(2, 16, mu=0.3)
+    if method == "auto without sweeps":
+        method = request.getfixturevalue("without_sweeps") or "auto"
     monkeypatch.setattr(
         InterfaceProblem, "explicit", lambda self: pytest.fail("Q was formed as an array")
     )

@@ -1,15 +1,29 @@
 """Loads: a pressure against Lame's solutions and on closed surfaces, and what each load answers."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
+from test_page import data_of, decoded
 
 import contactopt
-from contactopt import InputError, Material, Part, Pressure, Rigid, Scene, Support, Traction
+from contactopt import (
+    BodyForce,
+    InputError,
+    Material,
+    Part,
+    Pressure,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+)
 from contactopt.bodies.body import build_body
-from contactopt.figures.check_page import _normals
+from contactopt.figures.check_page import _normals, write_check_page
+from contactopt.figures.scene_check import check_scene
+from contactopt.holding.grown_load import load_rows
+from contactopt.scenes.loads import Load
 from contactopt.scenes.parameters import parameter
 from contactopt.scenes.scene_files import read_scene_file
 from contactopt.simplification.search import simplify
@@ -169,3 +183,43 @@ def test_arrows_of_check_are_normal_to_the_boundary():
     mesh = ring(IN, OUT, 3, 24)
     x, n = _normals(mesh, mesh.boundaries["inside"])
     assert np.all(np.sum(n * x, axis=0) < -0.98 * IN)
+
+
+@dataclass(frozen=True)
+class Spin(Load):
+    """The centrifugal load of a body that turns around the last axis: a number without a direction
+    inside the whole body, and another force at every place.
+    """
+
+    what, form, boundary = "spin", "spin:BODY", ""
+    size: float  # density times the square of the speed [force / length^4]
+
+    def values(self, components):
+        return {"": self.size}
+
+    def with_values(self, values):
+        return replace(self, size=values[""])
+
+    def check(self, body, kind):
+        pass
+
+    def density(self, x, n):
+        force = self.size * np.asarray(x)
+        force[-1] = 0.0
+        return force
+
+
+def test_a_load_inside_a_body_may_differ_from_place_to_place(tmp_path):
+    """What check draws, what limit calls it, and its resultant; bounds and sections refuse it."""
+    scene = block((BodyForce((0.0, -1.0)), Spin(4.0)))
+    own = build_body(scene, scene.upper, 1, None)
+    assert np.allclose(own.load[own.unknowns].sum(axis=1), (2.0, -1.0))  # the integral of 4 x
+    shown = data_of(write_check_page(check_scene((scene,)), tmp_path / "check.html"))
+    (arrow,) = (
+        item["states"]["vector"] for item in shown["contacts"] if item["name"] == "block: spin"
+    )
+    assert np.allclose(decoded(arrow), [2.0, 0.0, 0.0])
+    assert load_rows(scene) == {
+        "block:body_force:x": (0.0, False), "block:body_force:y": (-1.0, False),
+        "block:spin": (4.0, False),
+    }  # fmt: skip

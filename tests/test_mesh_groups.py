@@ -278,7 +278,7 @@ def test_exodus_blocks_and_sides_that_are_not_known_are_refused(tmp_path):
     """What a file names is read or refused; shells on a brick are a surface of it."""
     h5py = pytest.importorskip("h5py")
 
-    def change(**values):
+    def change(body="low", **values):
         exodus_bricks(tmp_path / "a.exo", True)
         with h5py.File(tmp_path / "a.exo", "a") as file:
             for name, (value, kind) in values.items():
@@ -287,7 +287,7 @@ def test_exodus_blocks_and_sides_that_are_not_known_are_refused(tmp_path):
                 file[name] = np.array(value)
                 if kind:
                     file[name].attrs["elem_type"] = np.bytes_(kind)
-        return load_mesh(tmp_path / "a.exo", "low")
+        return load_mesh(tmp_path / "a.exo", body)
 
     for values in (
         {"connect3": ([[41, 42, 43, 44]], "NSIDED")}, {"side_ss1": ([1, 7, 1], "")},
@@ -298,6 +298,15 @@ def test_exodus_blocks_and_sides_that_are_not_known_are_refused(tmp_path):
     low = change(connect3=([[1, 2, 3, 4]], "SHELL4"), elem_ss1=([3], ""), side_ss1=([2], ""))
     assert len(low.boundaries["tip"]) == len(low.boundaries["side 1"]) == 1
     assert flux(low, "tip") == pytest.approx(0) and volume(low) == pytest.approx(1)
+    # blocks and sets of one name are one; triangles in space are shells with two faces
+    same = np.array([list(b"low "), list(b"low "), list(b"tip ")], dtype="u1").view("S1")
+    base = {"ns_prop1": ([7, 8], ""), "ns_names": (same[:2], ""), "node_ns2": ([3, 4], "")}
+    both = change(eb_names=(same, ""), node_ns1=([1, 2], ""), **base)
+    assert volume(both) == pytest.approx(2) and len(both.boundaries["low"]) == 1
+    names = (np.repeat(same, [1, 1, 2], axis=0), "")
+    skin = {"eb_prop1": ([1, 2, 3, 4], ""), "eb_names": names, "connect4": ([[41, 42, 43]], "TRI3")}
+    tip = change("tip", **skin, elem_ss1=([4], ""), side_ss1=([2], ""))
+    np.testing.assert_array_equal(tip.boundaries["side 1"], tip.boundaries["tip"])
 
 
 @pytest.mark.parametrize("kind,count", [("CAX8R", 8), ("CPE4", 4), ("CPS6", 6), ("CAX3", 3)])

@@ -217,3 +217,17 @@ def test_a_press_fit_of_straight_meridians_is_not_complained_about(degree, overl
     pair = Contact("hub", "shaft", 0.2)
     scene = Scene("fit", bodies=bodies, contacts=(pair,), kind="axisymmetric", degree=degree)
     assert not [note for note in check_scene([scene]).notes if "constant pressure" in note]
+
+
+@pytest.mark.parametrize("edge", [0.05, 0.1, 0.15])
+def test_a_ring_that_begins_within_the_face_at_the_axis_is_not_complained_about(edge):
+    """At 0.1 the part that is covered has the integral of the whole, because of its weight r."""
+    ring = tensor_mesh(np.array([edge, 1.6]), np.array([1.0, 2.0]))
+    disc = tensor_mesh(np.array([0, 0.2, 1, 2]), np.array([0.0, 1.0]))
+    bodies = (
+        Part("ring", ring, MATERIAL, (), (Traction("y+", (0, -1.0)),), "y-"),
+        Part("disc", disc, MATERIAL, (Support("y-", {"z": 0}),), (), "y+"),
+    )
+    pair = Contact("ring", "disc", 0.2)
+    scene = Scene("ring", bodies=bodies, contacts=(pair,), kind="axisymmetric")
+    assert not reduce_bodies(scene).coupling.remarks

@@ -40,6 +40,7 @@ KINDS = {
     "method": Kind("A method", "run punch-2d --mu 0.2 --elements 4 --tol 1e-3 --method projection"),
     "law": Kind("A law"),
     "load": Kind("A load", listed=False),
+    "kind": Kind("A kind of analysis", listed=False),
     "coupling": Kind("A coupling", listed=False),
     "preconditioner": Kind(
         "A preconditioner", "run punch-2d --elements 8 --q implicit --preconditioner fourier"

@@ -74,7 +74,9 @@ def _kept(levels: Sequence[Level]) -> list[float]:
 
 
 def grows(values: Sequence[float], count: int) -> bool:
-    """Whether the last values, or every second one, grow steadily as the elements there shrink."""
+    """Whether the last values, or every second of them, grow steadily as the elements at the corner
+    shrink.
+    """
     for step in (1, 2):
         growths = -np.diff(values[::step][: count + 1])
         if len(growths) == count and np.all(growths > 0):

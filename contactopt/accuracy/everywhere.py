@@ -52,7 +52,7 @@ SWING = 0.25  # of a difference that remains if the next one has the opposite si
 
 
 def best_order(quantity: str, degree: int) -> int:
-    """The highest order of convergence that is believed of a quantity."""
+    """The highest order of convergence that an estimate assumes for a quantity."""
     return 2 if quantity.startswith(EDGES) else min(2 * degree, 3)
 
 
@@ -62,7 +62,7 @@ def safety(meshes: int) -> float:
 
 
 def believed(best: float, meshes: int) -> float:
-    """The highest order that is believed of so many nested meshes, `best` in the limit."""
+    """The highest order of convergence that so many nested meshes can show: at most `best`."""
     return best if meshes >= FEW else min(best, CERTAIN)
 
 

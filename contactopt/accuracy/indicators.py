@@ -71,9 +71,9 @@ class ElementErrors:
 
 
 def misfit(found: Sequence[ElementErrors]) -> float:
-    """By how much the last two refinements changed the value with its estimated error, which exact
-    estimates would not [its unit]; `found` belong to the last three meshes. The earlier change
-    counts less, as the estimated error has fallen since.
+    """By how much the last two refinements changed the sum of the value and its estimated error
+    [its unit]. Exact estimates would not change it. `found` belong to the last three meshes. The
+    earlier change counts less, as the estimated error has fallen since.
     """
     changes = np.abs(np.diff([errors.value + errors.total for errors in found]))
     if len(changes) > 1:
@@ -121,7 +121,7 @@ def element_errors(
     if volumes and (curved or quantity.reader is None):
         parts = zip(errors, solved.reduction.scene.parts, bodies, volumes, displaced, fields)
         errors = tuple(
-            one + _of_shape(part, state.problem.dim, body, volume, U, W, curved)
+            one + _of_shape(part, body, volume, U, W, curved)
             for one, part, body, volume, U, W in parts
         )
     if seeds.reactions is not None and not seeds.bodies:
@@ -133,7 +133,6 @@ def element_errors(
 
 def _of_shape(
     part: Part,
-    dim: int,
     body: Body,
     volume: np.ndarray,
     U: np.ndarray,
@@ -143,12 +142,12 @@ def _of_shape(
     """What volumes (elements,) between facets and their curves add to the error."""
     if not np.any(volume):
         return np.zeros(len(volume))
-    load, origin = np.zeros(dim), np.zeros((dim, 1))
-    for own in part.loads:
-        if not own.boundary:
-            load += own.density(origin, origin)[:, 0]
-    (work,) = added_work(body, volume, load, U, W)
-    (energy,) = added_work(body, volume, 0 * load, U, U)
+
+    def force(x: np.ndarray) -> np.ndarray:
+        return sum((own.density(x, x) for own in part.loads if not own.boundary), np.zeros_like(x))
+
+    (work,) = added_work(body, volume, force, U, W)
+    (energy,) = added_work(body, volume, np.zeros_like, U, U)
     return np.asarray(work - curved * energy)
 
 

@@ -206,9 +206,10 @@ def plateau(reduction: Reduction, pressure: np.ndarray, peaks: Sequence[Peak]) -
 
 
 def overlooked(reduction: Reduction, touching: np.ndarray, apart: np.ndarray) -> np.ndarray:
-    """The contacts between which the gap of a rigid body, sampled within every facet, undercuts
-    what the facet has between its nodes by more than the surfaces are `apart` (k,) [length] and
-    CLOSURE of the closure, which those `touching` (k,) show.
+    """The contacts between which the gap of a rigid body is smaller than that of the nodes
+    suggests. The gap is sampled within every facet. It counts if the difference exceeds the sum of
+    the distance of the surfaces, `apart` (k,) [length], and a share CLOSURE of the closure, which
+    the contacts `touching` (k,) show.
     """
     scene, problem = reduction.scene, reduction.problem
     found = [np.empty(0, dtype=int)]

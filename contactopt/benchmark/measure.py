@@ -121,7 +121,9 @@ def calibration() -> float:
 
 
 def judge(task: Task, problem: InterfaceProblem | Sequence, answer: Answer) -> dict[str, Any]:
-    """The columns that follow from the answer, whose own word counts only as failure."""
+    """The columns that follow from an answer. What a method says of itself counts only if it
+    reports a failure.
+    """
     out: dict[str, Any] = {"message": answer.message, "time": _now(), **answer.measured}
     if answer.reactions is None:
         seconds = answer.measured.get("call_seconds", np.nan)

@@ -99,7 +99,7 @@ class Answer:
 
 
 class PeerAnswer(Answer):
-    """An answer from a process of its own, whose measurements are believed: no other's are."""
+    """An answer from a separate process. Measurements are taken over from such answers only."""
 
 
 @dataclass

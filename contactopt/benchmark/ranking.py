@@ -1,7 +1,7 @@
 """Who is first: methods compared at the accuracy that they reach, not at the one asked for.
 
 The runs of a method on a problem are points: median time and worst
-certificate of the repeats, one for each tolerance asked. The time to an accuracy is read off their
+certificate of the repeats, one for each tolerance. The time to an accuracy is read off their
 front, straight in logarithms; what does not reach it counts as its time limit, and times below
 NOISE count as NOISE. A problem that a method refuses at every tolerance is not applicable to it: no
 failure, and nobody is ranked there. A ranking compares on the problems that all entrants take.
@@ -41,8 +41,8 @@ JOINED = {
 
 
 def factors(table: pd.DataFrame) -> dict[str, tuple[float, str]]:
-    """For each machine but the one of most rows, what its times are divided by, and how that was
-    measured; nan where nobody knows.
+    """The factor by which the times of each other machine are divided, to compare them with those
+    of the machine that has most rows, and how it was measured; nan where it is unknown.
 
     Runs that were made on both give the factor, a geometric mean. Without such runs it is the ratio
     of the calibrations, if the same methods ran on both.

@@ -74,7 +74,7 @@ def speed_accuracy(
     """Draw time against certified residual: per method a line through its settings, medians over
     problems and repeats.
 
-    Filled: at least half of the runs kept the tolerance. The eight that keep most, and are the
+    Filled: at least half of the runs reached the tolerance. The eight that reach most, and are the
     fastest among these, have colours and names. The Pareto front, where nothing is both faster and
     more accurate, is drawn in grey. A residual below FLOOR of its tolerance is drawn at FLOOR.
     """
@@ -183,7 +183,7 @@ def time_to_accuracy(
 
 
 def _at_settings(table: pd.DataFrame, metric: str, by: str) -> pd.DataFrame:
-    """The times of the instances, inf where a run did not keep its tolerance."""
+    """The times of the instances, inf where a run did not reach its tolerance."""
     timed = table.assign(_time=table[metric].where(table["success"], np.inf))
     return (
         timed.groupby([*INSTANCE, by])["_time"]

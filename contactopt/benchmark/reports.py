@@ -168,7 +168,7 @@ def _foot(layout: Experiment, folder: Path, table: pd.DataFrame) -> str:
         )
     machines, versions = ("; ".join(sorted(set(table[key]))) for key in ("machine", "versions"))
     lines = [
-        f"{count(len(table), 'run')}, of which {failures} did not keep their tolerance. Every"
+        f"{count(len(table), 'run')}, of which {failures} did not reach their tolerance. Every"
         " success is a certificate recomputed from the problem.",
         f"Wall time over CPU time of the calls is {busy:.2f}, a median over the methods. More than"
         f" 1 means a busy machine, and above {BUSY:g} nothing is ranked. CPU times are compared,"

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from importlib.metadata import version
 from typing import Any
 
@@ -81,6 +81,11 @@ def _backends(name: str, settings: str, dims: tuple[int, ...]) -> str:
     return ", ".join(f"{backend} {version}" for backend, version in versions.items()) or NATIVE
 
 
+@cache
+def _own_version() -> str:
+    return version("contactopt")  # reads a file
+
+
 @dataclass(frozen=True)
 class Run:
     """One run; `key` tells it apart from all others, also from those of another version of this
@@ -99,6 +104,6 @@ class Run:
     @cached_property
     def key(self) -> str:
         method, backends = self.method.label, self.method.backends(2, 3)
-        made = version("contactopt"), backends, self.source
+        made = _own_version(), backends, self.source
         parts = (self.problem.label, method, made, self.setting, self.repeat)
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:20]

@@ -50,8 +50,9 @@ def require(*modules: str, extra: str = "benchmark") -> None:
 
 
 class Store:
-    """The appending end, for one campaign at a time (file lock), a context manager; InputError for
-    results without `resume`, another campaign, or a folder that cannot be written.
+    """A context manager that appends rows to the table of a campaign. A file lock admits one
+    campaign at a time. InputError for results without `resume`, another campaign, or a folder that
+    cannot be written.
     """
 
     def __init__(self, folder: Path, resume: bool):
@@ -117,7 +118,9 @@ class Store:
 
 
 def lines(path: Path) -> Iterator[dict[str, Any]]:
-    """The rows of a rows.jsonl, others with a warning left out; InputError on a newer schema."""
+    """The rows of a file rows.jsonl. Lines that are no rows are left out, with a warning.
+    InputError on a newer schema.
+    """
     with open(path, "rb") as file:
         for number, line in enumerate(file, 1):
             try:

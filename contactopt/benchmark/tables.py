@@ -32,7 +32,7 @@ def select(table: pd.DataFrame, **where: object) -> pd.DataFrame:
 def told(
     table: pd.DataFrame, *findings: Callable[[pd.DataFrame], str | Sequence[str]]
 ) -> list[str]:
-    """The sentences of the functions of a table, or of their InputErrors."""
+    """The sentences that functions find in a table, or a sentence for what the table lacks."""
     sentences: list[str] = []
     for finding in findings:
         try:
@@ -44,7 +44,7 @@ def told(
 
 
 def success_table(table: pd.DataFrame, by: str = "method", across: str = "setting") -> pd.DataFrame:
-    """Percent of runs that kept the tolerance, of right claims, and the ways of failing."""
+    """Percent of runs that reached the tolerance, of right claims, and the ways of failing."""
     import pandas as pd
 
     groups(table, across)  # complains if there is no such column

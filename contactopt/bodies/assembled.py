@@ -204,8 +204,8 @@ class AssembledBody(ABC):
 
 
 class UndividedBody(AssembledBody, Body):
-    """A body without a linear system, so that it is both stages, which moves freely as a whole in
-    the components of its part that have a total force. In the others it is moved as given.
+    """A body without a linear system, which needs no preparation. It moves freely as a whole in the
+    components of its part that have a total force. In the others it is moved as given.
 
     whole   (dim,) numbers of the unknowns that are its motion as a whole
     fields  (n, p) displacements of its free motions

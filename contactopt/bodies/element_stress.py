@@ -1,17 +1,20 @@
 """Displacement and stress inside a body of finite elements, computed element by element."""
 
+from collections.abc import Callable
+
 import numpy as np
 import skfem
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.elements import weight_at
+from contactopt.bodies.elements import weight_at, with_jacobians
 from contactopt.bodies.fields import PLACES, Fields, Validity, von_mises
 from contactopt.defaults import ROUNDED
 from contactopt.meshes.cells import SHAPES, second_order, straight
-from contactopt.scenes.kinds import Kind
+from contactopt.scenes.kinds import Constants
 
 # elements whose shape functions are evaluated at a time, which bounds the memory that they take
 BLOCK = 2000
+Force = Callable[[np.ndarray], np.ndarray]  # per volume (dim, m), at places (dim, m)
 
 
 def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0.0) -> Validity:
@@ -141,11 +144,11 @@ def _product(body: Assembly, first: np.ndarray, second: np.ndarray) -> np.ndarra
 
 
 def added_work(
-    body: Assembly, volumes: np.ndarray, load: np.ndarray, U: np.ndarray, *others: np.ndarray
+    body: Assembly, volumes: np.ndarray, force: Force, U: np.ndarray, *others: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """For each W of the others what volumes (elements,) [length^dim] with the force per volume
-    `load` (dim,), added to the elements of a body, would work (elements,) [force length]:
-    load . W - s(U) : C^-1 : s(W), by the means of the elements.
+    force(x) (dim, elements), added to the elements of a body, would work (elements,) [force
+    length]: force . W - s(U) : C^-1 : s(W), by the means of the elements.
     """
     basis = body.basis
     centre = np.asarray(basis.global_coordinates()).mean(axis=2)
@@ -153,31 +156,35 @@ def added_work(
     own = stress_in(body, basis, U).mean(axis=3)
     for W in others:
         stress = own if W is U else stress_in(body, basis, W).mean(axis=3)
-        moved = np.tensordot(load, np.asarray(basis.interpolate(W)).mean(axis=2), 1)
+        moved = np.sum(force(centre) * np.asarray(basis.interpolate(W)).mean(axis=2), axis=0)
         found.append(np.asarray((moved - _product(body, own, stress)) * measure))
     return tuple(found)
 
 
 def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
     """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
-    field = basis.interpolate(U)
-    gradient, hoop = np.asarray(field.grad), None
+    places, shape, dim = basis.X, basis.elem.elem, len(basis.mesh.p)
+    elements = slice(None) if basis.tind is None else basis.tind
+    values, slopes = zip(*(shape.lbasis(places, i) for i in range(basis.Nbfun // dim)))
+    own = U[basis.element_dofs].reshape(len(values), dim, -1)
+    mapping = with_jacobians(basis.mapping, places, elements)
+    local = np.einsum("iae,ibq->abeq", own, np.stack(slopes), optimize=True)
+    inverse = np.asarray(mapping.invDF(places, tind=basis.tind))
+    gradient, hoop = np.einsum("abeq,bceq->aceq", local, inverse), None
     if body.weight[1]:  # u_r / r, on the axis its limit
         r = np.asarray(basis.global_coordinates())[0]
         away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
-        hoop = np.divide(np.asarray(field)[0], r, where=away, out=limit)
-    return stress_of(body.kind, body.kind.constants(body.material), gradient, hoop)
+        hoop = np.divide(own[:, 0].T @ np.stack(values), r, where=away, out=limit)
+    return stress_of(body.kind.constants(body.material), gradient, hoop)
 
 
-def stress_of(
-    kind: Kind, constants: tuple[float, float], gradient: np.ndarray, hoop: np.ndarray | None
-) -> np.ndarray:
+def stress_of(constants: Constants, gradient: np.ndarray, hoop: np.ndarray | None) -> np.ndarray:
     """Stress (3, 3, e, q) of a gradient (dim, dim, e, q) and of a hoop strain, if there is one."""
-    lam, shear = constants
+    lam, shear, across = constants
     dim = len(gradient)
     strain = np.zeros((3, 3, *gradient.shape[2:]))
     strain[:dim, :dim] = (gradient + gradient.swapaxes(0, 1)) / 2
     if hoop is not None:
         strain[2, 2] = hoop
-    pressed = np.diag([1.0, 1.0, 0.0 if kind.stretches else 1.0])[:, :, None, None]
-    return np.asarray(2 * shear * strain + lam * np.trace(strain) * pressed)
+    pressed = np.diag([lam, lam, across])[:, :, None, None]
+    return np.asarray(2 * shear * strain + np.trace(strain) * pressed)

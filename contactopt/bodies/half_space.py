@@ -144,7 +144,9 @@ class HalfSpaceBody(UndividedBody):
         if np.any(signs != signs[0]) or not np.allclose(np.abs(signs[0]), 1.0, rtol=1e-12):
             return None
         sign, known = signs[0], self.kernel.symbols
-        symbols = {(a, b): sign[a] * sign[b] * symbol for (a, b), symbol in known.items()}
+        symbols = {
+            (a, b): -symbol if sign[a] * sign[b] < 0 else symbol for (a, b), symbol in known.items()
+        }
         return replace(self.kernel, symbols=symbols)
 
     def through(self, T: sp.csr_matrix) -> Seen:

@@ -7,6 +7,7 @@ import scipy.sparse as sp
 import skfem
 
 from contactopt.bodies.elements import Weight, weight_at, with_jacobians
+from contactopt.scenes.kinds import Constants
 
 
 class Stiffness(sp.bsr_matrix):
@@ -16,9 +17,7 @@ class Stiffness(sp.bsr_matrix):
         return self.tocsr()[key]
 
 
-def isotropic_stiffness(
-    basis: skfem.CellBasis, constants: tuple[float, float], weight: Weight
-) -> Stiffness:
+def isotropic_stiffness(basis: skfem.CellBasis, constants: Constants, weight: Weight) -> Stiffness:
     """Elastic stiffness (N, N) [force / length]: the integral of sigma(u) : epsilon(v), with the
     hoop strain u_r / r if axisymmetric.
 
@@ -51,12 +50,12 @@ def isotropic_stiffness(
 
 
 def _element_matrices(
-    basis: skfem.CellBasis, elements: np.ndarray, constants: tuple[float, float], weight: Weight
+    basis: skfem.CellBasis, elements: np.ndarray, constants: Constants, weight: Weight
 ) -> np.ndarray:
     """Element stiffness (element, a, i, b, j) as one product: the integral of lambda g_ia g_jb + G
     g_ib g_ja + G (g_i . g_j) delta_ab, with g_ia the derivative of N_i by a.
     """
-    lam, shear = constants
+    lam, shear, _ = constants
     places, shape, dim = basis.X, basis.elem.elem, len(basis.mesh.p)
     mapping = with_jacobians(basis.mapping, places, elements)
     values, slopes = zip(*(shape.lbasis(places, i) for i in range(basis.Nbfun // dim)))

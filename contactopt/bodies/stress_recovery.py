@@ -44,6 +44,7 @@ from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import straight
 from contactopt.meshes.structured import simplices
+from contactopt.scenes.kinds import Constants
 
 POINTS = 1.5  # least number of points in a patch, over the number of coefficients
 STEEP = 12.0  # of the weights: `pytest tests/test_recovery.py -k hole`, error 0.08, with 0: 0.20
@@ -58,7 +59,7 @@ class StressMap:
     fit        of the stresses of the elements around each place
     used       numbers of the elements whose stresses are fitted
     even       (m, 4 or 6) 0 for the shear across a plane of symmetry at a place in it, else 1
-    basis      of the element stress at its quadrature points;   constants  lambda and mu
+    basis      of the element stress at its quadrature points;   constants  of Hooke's law
     """
 
     places: np.ndarray
@@ -68,7 +69,7 @@ class StressMap:
     even: np.ndarray
     body: Assembly
     basis: skfem.CellBasis
-    constants: tuple[float, float]
+    constants: Constants
 
     @property
     def mesh(self) -> skfem.Mesh:
@@ -126,7 +127,7 @@ class StressMap:
         for number in range(basis.Nbfun):
             field = basis.basis[number][0]
             hoop = None if radius is None else np.asarray(field)[0] / radius
-            stress = stress_of(self.body.kind, self.constants, np.asarray(field.grad), hoop)
+            stress = stress_of(self.constants, np.asarray(field.grad), hoop)
             for own, (i, j) in zip(entries, places):
                 own.append(stress[i, j])
         row = np.tile(np.arange(shape[0]), basis.Nbfun)

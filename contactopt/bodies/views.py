@@ -107,13 +107,13 @@ def recovery_errors(body: Body, U: np.ndarray, *others: np.ndarray) -> tuple[np.
 
 
 def added_work(
-    body: Body, volumes: np.ndarray, load: np.ndarray, U: np.ndarray, *others: np.ndarray
+    body: Body, volumes: np.ndarray, force: element_stress.Force, U: np.ndarray, *others: np.ndarray
 ) -> tuple[np.ndarray, ...]:
     """As element_stress.added_work; (0,) for a body without elements."""
     elements = elements_of(body)
     if elements is None:
         return (np.zeros(0),) * len(others)
-    return element_stress.added_work(elements, volumes, load, U, *others)
+    return element_stress.added_work(elements, volumes, force, U, *others)
 
 
 def on_elements(body: Body, values: np.ndarray) -> np.ndarray:

@@ -28,8 +28,9 @@ PARTS = {2: 16, 3: 2}  # and of an edge of a piece of one
 
 
 class Points(NamedTuple):
-    """Points on S pieces of the facets of a pair, s on each: the facet of each piece on either side
-    (2, S), shares of its vertices (2, dim, S, s), and weights (S, s) [length^(dim - 1)].
+    """Points of integration on S pieces of the facets of a pair, s on each piece: the facet of each
+    piece on either side (2, S), the shares of its vertices (2, dim, S, s), and the weights (S, s)
+    [length^(dim - 1)].
     """
 
     facets: np.ndarray
@@ -161,7 +162,9 @@ class FacingFacets:
         return out
 
     def lift(self, nodal: Sequence[np.ndarray], height: np.ndarray, component: int = 0) -> None:
-        """Add (f, q) at nodes to gap or slip component; at shared ones the largest."""
+        """Add `height` (f, q) at nodes to a component of gap or slip. Where facets share a node,
+        the largest counts.
+        """
         side = self.sides[0]
         added = np.full(nodal[side.body].shape[1], -np.inf)
         np.maximum.at(added, side.nodes, height.T)
@@ -169,7 +172,9 @@ class FacingFacets:
         nodal[side.body][:] += side.sign * self.frame[component][:, None] * added
 
     def moments(self, number: int, tractions: np.ndarray) -> np.ndarray:
-        """(v, f, dim) of tractions (k, dim) on a side with hat functions, zero on an axis."""
+        """The moments (v, f, dim) of tractions (k, dim) with the hat functions of a side, zero on
+        an axis.
+        """
         side, points = self.sides[number], self.rule
         t = self.of_contacts(tractions)[:, points.facets[0]] @ self.frame  # (v, S, dim)
         own = np.einsum(
@@ -311,7 +316,9 @@ def quadratic_shapes(at: np.ndarray) -> np.ndarray:
 
 
 def control_points(values: np.ndarray, d: int) -> np.ndarray:
-    """Those of Bernstein (S, q) of quadratic functions with values (S, q) at nodes of facets."""
+    """Bernstein's control points (S, q) of quadratic functions with values (S, q) at nodes of
+    facets.
+    """
     ends = np.array(list(combinations(range(d), 2)))
     between = 2 * values[:, d:] - values[:, ends].mean(axis=2)
     return np.concatenate([values[:, :d], between], axis=1)

@@ -11,8 +11,8 @@ STIFF = 1e6  # of the equations, in the same scale
 
 
 class LeastInBalance:
-    """The x with x' K x / 2 + slope' x least under C x = values, factorised once for all slopes and
-    values. InputError for elements without a height, of which K is singular.
+    """The minimiser of x' K x / 2 + slope' x under C x = values. The system is factorised once, for
+    all slopes and values. InputError for elements without a height, for which K is singular.
     """
 
     def __init__(self, K: sp.csr_matrix, C: sp.csr_matrix):

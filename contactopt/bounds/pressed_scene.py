@@ -27,6 +27,7 @@ from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
 from contactopt.meshes.cells import is_curved
+from contactopt.scenes.loads.load import Uniform
 from contactopt.solving.solve_scene import Solved
 
 if TYPE_CHECKING:
@@ -266,7 +267,7 @@ class PressedScene:
         for load in part.loads:
             if load.level:
                 holding.append((load.boundary, None if load.glued else load.force))
-            elif "" in load.values(components):
+            elif not isinstance(load, Uniform):
                 raise InputError(f"body '{part.name}': a bound does not know a {load.what}.")
             elif load.boundary and loaded:
                 own = np.asarray(mesh.boundaries[load.boundary])

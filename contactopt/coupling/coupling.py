@@ -192,7 +192,8 @@ def of_contacts(
 ) -> Coupling:
     """The coupling at contacts, from their chart, frames and order, and maps in this order."""
     chart, frames, order = laid_out
-    gap, areas, places = points.gap[order], points.areas[order], points.points[:, order]
+    gap, areas = points.gap[order], points.areas[order]
+    places = np.take(points.points, order, axis=1)  # each component by itself in memory
     cells = points.cells if chart.cells is None else chart.cells
     planes = tuple(symmetry_planes(points))
     share = None if share is None else share[order]
@@ -214,7 +215,8 @@ def local_map(
         if frames.strides[0] == 0:  # one frame for all, which usually swaps axes and no more
             row, column = np.nonzero(frames[0])
             count = np.tile(np.bincount(row, minlength=dim), k)
-            data, columns = values[:, column] * frames[0][row, column], unknowns[:, column]
+            data = np.take(values, column, axis=1) * frames[0][row, column]
+            columns = np.take(unknowns, column, axis=1)
         else:
             used = frames != 0
             count = np.count_nonzero(used, axis=2)
@@ -248,6 +250,8 @@ def guided(
     and friction along e_t acts on what holds the bodies. Otherwise it would be a part of the normal
     force under another name, and neither would be unique.
     """
+    if not held.any():
+        return T
     leaning = held.T & (np.abs(frames[:, 0]) > EQUAL)
     some = np.flatnonzero(leaning.any(axis=1))
     if not len(some):

@@ -42,11 +42,11 @@ class Facets:
     angle: np.ndarray
 
     def take(self, some: np.ndarray) -> Facets:
-        """Those with the numbers `some`."""
+        """The facets with the numbers `some`."""
         return Facets(self.centre[:, some], self.radius[some], self.axis[:, some], self.angle[some])
 
     def spread(self, places: np.ndarray, count: int) -> Facets:
-        """These at some places among `count`, and no numbers between them."""
+        """The facets at some places among `count`; at all other places there is none."""
         number = np.full(count, -1)
         number[places] = np.arange(len(places))
         made = self.take(number)

@@ -90,6 +90,8 @@ def _without_copies(surface: Surface, outward: np.ndarray) -> Surface:
     the direction to it.
     """
     k = surface.points.shape[1]
+    if surface.chart is not None:  # the points of a grid have no copies
+        return surface
     both = np.concatenate([surface.points, outward])
     known, first, own = np.unique(both, axis=1, return_index=True, return_inverse=True)
     if known.shape[1] == k:

@@ -196,6 +196,8 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     if first == 1:
         weights, alone = weights[::-1], alone[::-1]
     share = sums.areas / sums.full
+    # with the weight r a part of a face may have the integral of all of it
+    share = np.where(sums.partial, np.minimum(share, 1 - 2 * EQUAL), share)
     return Mortar(
         first, nodes, sums.areas, n, gap, x, share, weights, alone, lever, sums.across, carried
     )

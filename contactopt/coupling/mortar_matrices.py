@@ -26,7 +26,7 @@ BLOCK = 200_000  # points of integration at a time
 
 @dataclass(frozen=True, eq=False)
 class Integrals:
-    """What the overlap of an own surface with another one gives to k contacts.
+    """Integrals over the overlap of a surface with another one, for k contacts.
 
     nodes    (k,) nodes of the own side
     areas    (k,) integrals of the hat functions over the covered part, with the weight of the

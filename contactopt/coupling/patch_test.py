@@ -69,6 +69,8 @@ def misfit(made: Coupling, surfaces: Sequence[Surface | None]) -> Misfit | None:
         for number, surface in enumerate(surfaces)
         if surface is not None and surface.mesh is not None
     ]
+    if not sides:
+        return None
     allowed = np.full(len(made.gap), EQUAL)
     if made.conforming or made.share is not None:
         allowed += _chords(made, sides)

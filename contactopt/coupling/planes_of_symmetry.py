@@ -55,8 +55,10 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
     and the normal one is not, and which the surface crosses smoothly: a slanted one has an edge
     there, and each side its own normal. A plate or a clamp may hold the surface elsewhere, too.
     """
-    tilts = smooth_tilts(contacts.normals, contacts.cells)
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
+    if not held.any():
+        return []
+    tilts = smooth_tilts(normals, contacts.cells)
     for c, mask in enumerate(held):
         found = []
         for side in (1.0, -1.0) if mask.any() else ():

@@ -108,12 +108,12 @@ class Reduction:
 
     @property
     def gap(self) -> np.ndarray:
-        """(k,) initial gap of all contacts [length]."""
+        """The initial gap (k,) of all contacts [length]."""
         return np.concatenate([made.gap for made in self.couplings])
 
     @property
     def frames(self) -> np.ndarray:
-        """(k, dim, dim) rows n, t1[, t2] of all contacts."""
+        """The directions n, t1[, t2] of all contacts as rows (k, dim, dim)."""
         return np.concatenate([made.frames for made in self.couplings])
 
     @property
@@ -163,6 +163,16 @@ class Reduction:
         parts = (B @ U for B, U in zip(self.maps, displaced))
         u = np.asarray(sum(parts, 0 * q.ravel())).reshape(q.shape)
         return u + self.gap[:, None] * np.eye(self.problem.dim)[0]
+
+    def moved(self, solution: Solution) -> np.ndarray:
+        """The relative displacements u (k, dim) of the contacts, as the problem measures them:
+        from those of the bodies where these are known and a product with Q costs more.
+        """
+        if has_entries(self.problem.Q) or solution not in self._known:
+            return self.problem.displacements(solution.reactions, solution.multipliers)
+        u = self.seen(self._known[solution])
+        u[:, 1:] -= self.slipped
+        return u
 
     def grounded(self) -> Reduction | None:
         """With thin bodies on a soft ground (contactopt.bodies.thin); None without any."""
@@ -275,7 +285,7 @@ def reduce_bodies(
 
     Raises
     ------
-    TooDear : Where a budget of work is open (contactopt.linear.budget) and too low.
+    TooDear : If this takes more work than an open budget allows (contactopt.linear.budget).
     """
     made = made or posed(scene, elements, zone, Q, coupling)
     assembled, couplings, maps, planes, spent = made

@@ -284,7 +284,9 @@ def _moved(problem: InterfaceProblem, solution: Solution) -> Moved:
 
 
 def told_apart(residual: float) -> float:
-    """The distance to a kink, over the largest force, below which a certificate tells no side."""
+    """The distance to a kink, over the largest force, below which a certificate cannot say on which
+    side of it a solution lies.
+    """
     return max(NEAR, 100 * residual)  # and this many times the certificate, if that is more
 
 

@@ -235,13 +235,13 @@ def _boundaries(
             }
     for load in part.loads:
         if not load.boundary:
-            force = np.array(list(load.values(scene.components).values()))
+            middle = mesh.p.mean(axis=1, keepdims=True)
             yield {
                 "name": f"{part.name}: {load.what}",
-                "places": _spatial(mesh.p.mean(axis=1, keepdims=True)),
+                "places": _spatial(middle),
                 "cells": np.zeros((0, 3), dtype=int),
                 "role": 2,
-                "vector": _spatial(force[:, None]),
+                "vector": _spatial(load.density(middle, middle)),
             }
 
 

@@ -102,7 +102,7 @@ def pressure(
     line, place = contact_line(problem), contact_place(problem)
     x, p = place[line], solution.reactions[line, 0] / problem.areas[line]
     a = contact_edge(scene, problem, solution.reactions)
-    area = contact_area(scene, problem, solution.reactions)
+    area = contact_area(scene, problem, solution.reactions, a)
     mean = solution.reactions[:, 0].sum() / area if area > 0 else 0.0
     scaled, mean = _about_origin(problem, solution, place, a), mean or 1.0
     unit = a if scaled else 1.0

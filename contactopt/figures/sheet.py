@@ -111,7 +111,7 @@ def part_lines(scene: Scene, part: Any, mesh: Mesh) -> list[str]:
 
 
 def sketch(meshes: list[Any]) -> list[str]:
-    """Lines of characters, one mark per body; of solids the section across the second axis."""
+    """Lines of characters, one mark per body; of a solid, the section across the second axis."""
     axes = [0, -1]
     low, high = _window([mesh.p[axes] for mesh in meshes])
     size = np.maximum(high - low, 1e-300)

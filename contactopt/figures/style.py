@@ -92,8 +92,9 @@ def dress(ax: Axes, spines: bool = False, letters: float = LETTERS) -> None:
 
 
 def add_legend(ax: Axes) -> None:
-    """A legend above our own axes, where it is off all lines, in as many columns as there is room
-    for, and in other people's axes, which may have a title, where it is best; none for one line.
+    """Add a legend, if there are two lines or more. Above our own axes it is off all lines, in as
+    many columns as there is room for. In other people's axes, which may have a title, it is where
+    matplotlib finds most room.
     """
     labels, letters = ax.get_legend_handles_labels()[1], ax.xaxis.label.get_size()
     if len(labels) < 2:
@@ -126,8 +127,8 @@ def add_colours(drawn: ScalarMappable, ax: Axes, label: str, **room: object) -> 
 
 def label_ends(ax: Axes, ends: Sequence[tuple[float, float, str, str]]) -> None:
     """Write coloured names beside the axes at the heights where lines end, (x, y, name, colour)
-    each, apart as letters are high: the nearest places in the sum of squares (isotonic regression).
-    A dotted line leads from a name to an end not beside it.
+    each. Names keep the height of a letter apart, as near to their ends as that allows in the sum
+    of squares (isotonic regression). A thin grey line leads from a name to an end not beside it.
     """
     from scipy.optimize import isotonic_regression
 
@@ -142,8 +143,8 @@ def label_ends(ax: Axes, ends: Sequence[tuple[float, float, str, str]]) -> None:
     places = isotonic_regression([end[1] for end in found] - steps).x
     places = np.clip(places, 0.0, max(0.0, 1.0 - steps[-1])) + steps
     for place, (right, up, x, y, name, colour) in zip(places, found):
-        beside = right > 0.94 and abs(place - up) < LETTERS / height
-        lead = {"arrowstyle": "-", "ls": ":", "lw": 0.5, "color": colour, "relpos": (0, 0.5)}
+        beside = right > 0.94 and abs(place - up) < LETTERS / height / 2
+        lead = {"arrowstyle": "-", "lw": 0.4, "color": "#aaaaaa", "relpos": (0, 0.5)}
         lead |= {"shrinkA": 0, "shrinkB": 2}
         look = {"color": colour, "va": "center", "fontsize": LETTERS, "annotation_clip": False}
         where = {"xytext": (1.03, place), "textcoords": "axes fraction"}

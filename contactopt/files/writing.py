@@ -154,7 +154,7 @@ def remove_files(folder: Path, names: Iterable[str]) -> None:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Within this block nothing is printed, neither by libraries that do not ask Python."""
+    """Within this block nothing is printed, not even by libraries that bypass Python."""
     sys.stdout.flush()
     sys.stderr.flush()
     kept = [os.dup(place) for place in (1, 2)]

@@ -40,7 +40,9 @@ class Found(NamedTuple):
 
 
 def answer(scene: Scene, load: str, force: float | None, found: list[Found]) -> str:
-    """The answer in a few sentences: both ends, whether 1 lies between them, whence they come."""
+    """The answer in a few sentences: both ends, whether 1 lies between them, and where they come
+    from.
+    """
     factor, interval, way, tried, closes, far = found[-1]
     if interval is None:
         return f"{scene.name}: the bodies {AWAY}, whatever the factor on {load} is."

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from contactopt.errors import InputError
-from contactopt.scenes.loads import Load
+from contactopt.scenes.loads import Load, load_classes
 from contactopt.scenes.scene import Part, Scene
 
 if TYPE_CHECKING:
@@ -30,7 +30,8 @@ def _place(part: AnyPart, load: Load) -> str:
     """What stands before the component in the name of a load."""
     if load.shared:
         return ":".join(("bolt", *load.address(part.name)))
-    return f"{part.name}:{load.boundary or 'body_force'}"
+    tables = {kind: table for table, kind in load_classes().items()}
+    return f"{part.name}:{load.boundary or tables.get(type(load), load.what)}"
 
 
 def _belongs(name: str, load: str) -> bool:

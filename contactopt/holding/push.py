@@ -49,7 +49,7 @@ class Push:
 
     @property
     def nothing(self) -> float:
-        """The factor on the load that is rounding beside the loads that stay."""
+        """The factor below which the load is rounding beside the loads that stay."""
         return float(EQUAL * (1 + np.abs(self.problem.s).sum() / np.linalg.norm(self.load)))
 
     def end(self, largest: bool) -> float:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class NextBest:
-    """The way to take where one of many steps turns out dearer than it promised.
+    """The way to take if the steps of another way cost more than was predicted.
 
     left : The way that is left then: 'coupled' or 'products'.
     Q, solver : The form of Q and the solver of the bodies to take instead.
@@ -35,13 +35,13 @@ class NextBest:
 
 @dataclass(eq=False)
 class Budget:
-    """Work that was done, and what is done instead of too much of it."""
+    """The work done so far, and the way to take once it becomes too much."""
 
     spent: float = 0.0
     instead: NextBest | None = None
 
     def check(self, work: float) -> None:
-        """TooDear if so much work in all is too much."""
+        """Raise TooDear if this work in all is too much."""
         if self.instead is not None and work > self.instead.most:
             raise TooDear(self.instead)
 
@@ -76,13 +76,13 @@ def open_budget(instead: NextBest | None = None) -> Iterator[None]:
 
 
 def fill(instead: NextBest | None) -> None:
-    """Say what is done where the budget that is open is too low, if anything is."""
+    """Say which way to take, if there is one, when the open budget is used up."""
     if instead is not None:
         _present().instead = instead
 
 
 def spend(work: float) -> None:
-    """Draw on the budget; TooDear where nothing is left."""
+    """Draw on the budget; TooDear when it is used up."""
     budget = _present()
     budget.spent += work
     budget.check(budget.spent)

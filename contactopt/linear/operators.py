@@ -79,7 +79,9 @@ class InterfaceOperator(LinearOperator):
         return self.counter.total
 
     def knowing(self, x: np.ndarray, X: Stacked) -> InterfaceOperator:
-        """The operator whose products begin with X of the bodies, close to theirs."""
+        """The operator whose products start from displacements X of the bodies that are close to
+        theirs.
+        """
         known = copy(self)
         known.known = x.copy(), X
         return known
@@ -160,9 +162,9 @@ Interface: TypeAlias = Any  # np.ndarray, sp.csr_array (scipy has no types) or I
 
 def form(Q: Interface) -> Form:
     """How Q is known: as 'array' or 'sparse', or by products alone ('bodies' or 'convolution')."""
-    if isinstance(Q, InterfaceOperator):
-        return Q.form
-    return "sparse" if sp.issparse(Q) else "array"
+    if isinstance(Q, np.ndarray):  # most often
+        return "array"
+    return Q.form if isinstance(Q, InterfaceOperator) else "sparse"
 
 
 def has_entries(Q: Interface) -> bool:

@@ -43,11 +43,14 @@ POINTS = re.compile(
     "CELAS|CDAMP|CMASS|CBUSH|CGAP|CVISC|CONM|CFAST|CWELD|CBEAR|CSEAM|CHBDY|CORD|CREEP|CYSYM|CYJOIN"
     "|CYAX|CSUPER|CSET|COUPLE|CAERO|CLOAD|CONV|CONVM|CBARAO|CSSCHD|CAMPBLL"
 )
+# cards that are not read though they make nodes or elements, those with a slip in the name, and
+# those that repeat the card above (=)
+UNKNOWN = re.compile("C|E?GRID|HEX|INCLUDE|PENTA|PLOT|PYR|QUAD|TETRA|TRIA|(?![A-Z][A-Z0-9]*$)")
 # properties that give shells and lines a stiffness
 SECTIONS = re.compile("P(BAR|BEAM|COMP|ROD|SHEAR|SHELL|TUBE)")
 # the order of meshio: edges along the third axis come last
 HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15]
-Card = tuple[int, list[str]]
+Card = tuple[int, list[str]]  # line and fields
 log = logging.getLogger(__name__)
 
 
@@ -71,7 +74,8 @@ def read_bulk_data(path: Path) -> Any:
         lost = np.argwhere(~np.isin(nodes, tags))
         if len(lost):
             number = nodes[tuple(lost[0])]
-            raise reader.fail(rows[lost[0, 0]][0], f"an element names node {number}, which is not")
+            said = f"an element names node {number}, which is not there"
+            raise reader.fail(rows[lost[0, 0]][0], said)
         if kind == "hexahedron20":
             nodes = nodes[:, HEXAHEDRON]
         cells.append((kind, np.searchsorted(tags, nodes[:, : CORNERS.get(kind)])))
@@ -124,7 +128,7 @@ class _Reader:
             self.sections.add(self.whole(line, "".join(card[1:2])))
         elif POINTS.match(name):
             self.passed |= set() if name.startswith("CORD") else {name}
-        elif name in ("INCLUDE", "PLOTEL3", "PLOTEL4", "CONROD") or name.startswith("C"):
+        elif UNKNOWN.match(name):
             raise self.fail(line, f"the card {name} is not known here; write the mesh without it")
 
     def tell_sections(self) -> None:
@@ -162,38 +166,49 @@ def _cards(path: Path) -> Iterator[Card]:
     begin = [n for n, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
     if len(begin) > 1:
         raise InputError(f"mesh file '{path}', line {begin[1] + 1}: it holds more than one BEGIN.")
-    card: Card | None = None
+    card, waits = None, ""
     for number, line in enumerate(lines[begin[0] + 1 :] if begin else lines, 1):
         number += begin[0] + 1 if begin else 0
         line = line.split("$")[0].rstrip().expandtabs(8)
         if not line:
             continue
-        fields = _fields(line)
+        fields, goes_on = _fields(line)
         if line[0] in "+*" or not fields[0]:
             if card is None:
                 raise Damaged("it begins within a card")
+            mark = fields[0].lstrip("+*")
+            if mark and waits and mark != waits:
+                said = f"line {number}: it goes on another card than the one above"
+                raise InputError(f"mesh file '{path}', {said}; put it below that one.")
+            waits = goes_on
             card[1].extend(fields[1:])
             continue
         if card is not None:
             yield card
         if fields[0] == "ENDDATA":
             return
-        card = number, fields
+        card, waits = (number, fields), goes_on
     raise InputError(f"mesh file '{path}', line {len(lines)}: it ends before ENDDATA.")
 
 
-def _fields(line: str) -> list[str]:
-    """The name, and the eight fields of a line, four if they are large."""
+def _fields(line: str) -> tuple[list[str], str]:
+    """The name, and the eight fields of a line, four if they are large; the last field, without its
+    sign, says with what the line begins in which the card goes on.
+    """
     if "," in line:
-        words = [word.strip() for word in line.upper().split(",")]
-        large = words[0].endswith("*")
-        if len(words) <= 10:  # the tenth field says where the card goes on
-            words = [words[0], *(words[1:] + [""] * 8)[: 4 if large else 8]]
-        fields = words
+        fields = [word.strip() for word in line.upper().split(",")]
+        count = 4 if fields[0].endswith("*") else 8
+        fields += [""] * (2 + count - len(fields))
+        if len(fields) > 10:  # a long line
+            count = len(fields)
     else:
         wide, count = (16, 4) if "*" in line[:8] else (8, 8)
-        text = line.upper().ljust(8 + wide * count)
+        text = line.upper().ljust(80)
         ends = range(8, 8 + wide * count, wide)
-        fields = [text[:8].strip(), *(text[i : i + wide].strip() for i in ends)]
-    fields[0] = fields[0].rstrip("*").strip()
-    return fields
+        fields = [
+            text[:8].strip(),
+            *(text[i : i + wide].strip() for i in ends),
+            text[72:80].strip(),
+        ]
+    goes_on = "".join(fields[1 + count :]).lstrip("+*")
+    return [fields[0].rstrip("*").strip(), *fields[1 : 1 + count]], goes_on

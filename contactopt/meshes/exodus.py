@@ -38,7 +38,10 @@ def read_exodus(path: Path) -> Any:
 
     Damaged, KeyError, IndexError or OSError where the file does not keep to the format.
     """
-    if path.read_bytes()[:3] == b"CDF":
+    head = path.read_bytes()[:4]
+    if head == b"CDF\5":
+        raise Damaged("it is of netCDF's fifth format; convert it: nccopy -k nc4 OLD NEW")
+    if head[:3] == b"CDF":
         from scipy.io import netcdf_file
 
         with netcdf_file(path, mmap=False) as file:
@@ -74,8 +77,9 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
         if kind.startswith("hexahedron"):
             nodes = nodes[:, HEXAHEDRON[: nodes.shape[1]]]
         cells.append((kind, nodes))
-        shells |= {len(cells) - 1} if TYPES["SHE"] is kinds else set()
-        sets[name] = {len(cells) - 1: np.arange(len(nodes))}
+        in_space = kind.startswith("triangle") and points.shape[1] == 3
+        shells |= {len(cells) - 1} if in_space or TYPES["SHE"] is kinds else set()
+        sets.setdefault(name, {})[len(cells) - 1] = np.arange(len(nodes))
     for name, number in _named(variables, "ss", "elem_ss", "side"):
         elements = np.array(variables[f"elem_ss{number}"][:], dtype=np.int64) - 1
         sides = np.array(variables[f"side_ss{number}"][:], dtype=np.int64) - 1
@@ -95,10 +99,10 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
         name: [own.get(i, np.zeros(0, dtype=int)) for i in range(len(cells))]
         for name, own in sets.items()
     }
-    of_points = {
-        name: np.array(variables[f"node_ns{number}"][:], dtype=np.int64) - 1
-        for name, number in _named(variables, "ns", "node_ns", "nodes")
-    }
+    of_points: dict[str, np.ndarray] = {}
+    for name, number in _named(variables, "ns", "node_ns", "nodes"):
+        own_nodes = np.array(variables[f"node_ns{number}"][:], dtype=np.int64) - 1
+        of_points[name] = np.union1d(of_points.get(name, own_nodes), own_nodes)
     return meshio.Mesh(points, cells, cell_sets=of_cells, point_sets=of_points)
 
 

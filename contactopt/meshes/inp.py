@@ -153,7 +153,7 @@ class Scope:
             self.later.append(block)
 
     def settle(self) -> None:
-        """Do what waits; Later with the line of what is nowhere."""
+        """Read the blocks that had to wait. Later names the line of what the file never defines."""
         left = [None] * (1 + len(self.later))
         while len(self.later) < len(left):
             left, self.later = self.later, []  # type: ignore[assignment]
@@ -190,7 +190,9 @@ class Scope:
             set_of(self.element_sets, own.name).update(dict.fromkeys((ids + by).tolist()))
 
     def name_sets(self) -> None:
-        """Unite the sets and surfaces of instances by name; else they are INSTANCE.NAME."""
+        """Take over the sets and surfaces of the instances. Those of one name are united; where the
+        assembly has a set of that name itself, they are called INSTANCE.NAME.
+        """
         taken = [{bare(n) for n in s} for s in (self.node_sets, self.element_sets, self.surfaces)]
         for own, by in self.instances.values():
 
@@ -260,7 +262,9 @@ class Scope:
         self.put(block, tags, self.places(block, rows), block.options.get("nset", ""))
 
     def put(self, block: Block, tags: list[int], places: np.ndarray, name: str) -> None:
-        """Add nodes, to a set if it has a name. The last place counts."""
+        """Add nodes, and put them into a set if it has a name. A node that is given twice has its
+        last place.
+        """
         size = EQUAL * np.abs(places).max(initial=0.0)
         for tag, place in zip(tags, map(tuple, places.tolist())):
             before = self.nodes.setdefault(tag, place)
@@ -360,9 +364,9 @@ class Scope:
             if last < first or step < 1:
                 raise block.fail("a range needs its first and last number and a step", line)
             by = self._of_instance(block, line)[1]
-            mine.update(dict.fromkeys(n + by for n in range(first, last + 1, step)))
-            ends: Named = dict.fromkeys((first + by, last + by), (block, line))
-            mine.update(ends)
+            own = range(first + by, last + by + 1, step)
+            mine.update(dict.fromkeys(own))
+            mine.update(dict.fromkeys((own[0], own[-1]), (block, line)))
         return mine
 
     def _of_instance(self, block: Block, line: int | None) -> tuple[Scope, int]:
@@ -387,7 +391,7 @@ class Scope:
         return {number + by: where for number, where in known[bare(word)].items()}
 
     def there(self, word: str, block: Block) -> Named:
-        """The elements that a word stands for, which are there but for gaps in ranges."""
+        """The elements that a word stands for. All must exist, but a range may have gaps."""
         found = self.numbers(word, "element_sets", block)
         for number, where in found.items():
             if where is not None and number not in self.elements:

@@ -38,7 +38,7 @@ def motion(block: Block, rows: list[Row]) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def system(scope: Scope, block: Block) -> None:
-    """Coordinates of nodes are from now on those in other directions from another origin."""
+    """Read the coordinates of nodes from now on in another system of coordinates."""
     values = [[block.real(line, word) for word in words] for line, words in block.rows]
     first, second = [*values, [], []][:2]
     if len(first) not in (0, 3, 6) or len(second) not in (0, 3) or len(values) > 2:

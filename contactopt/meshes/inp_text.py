@@ -174,9 +174,10 @@ def _other(block: Block) -> list[tuple[int, str]]:
     path, depth = source.named(block.place)[0], source.depths[block.place // LARGEST] + 1
     if depth > DEEPEST:
         raise block.fail("files include each other without end")
-    if not (path.parent / name).is_file():
-        raise block.fail(f"there is no file '{name}' beside this one")
-    return source.open(path.parent / name, depth)
+    for folder in (path.parent, source.files[0].parent):  # programs look beside the first file
+        if (folder / name).is_file():
+            return source.open(folder / name, depth)
+    raise block.fail(f"there is no file '{name}' beside this one")
 
 
 def _goes_on(text: str, after: str) -> bool:

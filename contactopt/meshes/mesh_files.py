@@ -60,8 +60,8 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
 
 
 def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
-    """The meshes of all groups of elements of a file, by their names; None for one without groups.
-    For each group that is no body, such as several in one, a sentence says why.
+    """The meshes of all groups of elements of a file, by their names, with None as the name if the
+    file has no groups; and a sentence for each group that is not one body.
     """
     groups = read_groups(path)
     _tell_others(path, groups)

@@ -20,16 +20,17 @@ import numpy as np
 
 from contactopt.errors import Damaged
 
+HEAD = 2**16  # bytes at the beginning of a file in which comments end and the version stands
+
 
 def version(path: Path) -> tuple[str | None, bool]:
     """The version that a file of Gmsh states, such as '4.1', or None; whether it is binary."""
     with path.open("rb") as file:
-        head = file.read(200).decode(errors="replace").split()
-    if head[:1] == ["$NOD"]:
+        head = file.read(HEAD)
+    if head.split(maxsplit=1)[:1] == [b"$NOD"]:
         return "1", False
-    if len(head) > 2 and head[0] == "$MeshFormat":
-        return head[1], head[2] != "0"
-    return None, False
+    stated = head.partition(b"$MeshFormat")[2][:99].decode(errors="replace").split()
+    return (stated[0], stated[1] != "0") if len(stated) > 1 else (None, False)
 
 
 def read_msh4(path: Path) -> Any:
@@ -48,6 +49,7 @@ def read_msh4(path: Path) -> Any:
         rows = reader.take(count * width, "u8").reshape(count, width)
         blocks.append((kind, rows[:, 1:]))
         members.append(groups.get((dim, entity), []))
+    reader.end()
     sets = {}
     for group in sorted({group for own in members for group in own}):
         sizes = (len(nodes) if group in own else 0 for (_, nodes), own in zip(blocks, members))
@@ -63,6 +65,7 @@ def read_msh2(path: Path) -> Any:
     names = _names(sections)
     if "Nodes" in sections:
         tags, points = sections["Nodes"].nodes(sections["Nodes"].line())
+        sections["Nodes"].end()
     else:
         tags, points = _parametric(sections["ParametricNodes"])
     found: dict[int, list[np.ndarray]] = {}  # the group of each element and its nodes, by kind
@@ -74,6 +77,7 @@ def read_msh2(path: Path) -> Any:
         count -= len(rows)
     if count:
         raise Damaged("a section ends early")
+    reader.end()
     table = {kind: np.concatenate(own) for kind, own in found.items()}
     sets: dict[str, list[np.ndarray]] = {}
     for i, (kind, rows) in enumerate(table.items()):
@@ -119,6 +123,9 @@ def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any
     from meshio.gmsh.common import _gmsh_to_meshio_order, _gmsh_to_meshio_type
 
     order = np.argsort(tags, kind="stable")
+    twice = np.flatnonzero(np.diff(tags[order]) == 0)
+    if (points[order[twice]] != points[order[twice + 1]]).any():
+        raise Damaged(f"node {tags[order[twice[0]]]} is there twice")
     cells = []
     for kind, rows in blocks:
         place = np.searchsorted(tags, rows, sorter=order)
@@ -150,6 +157,11 @@ class _Numbers:
         """The number on a line of its own, which is text in binary files, too."""
         return self.count()
 
+    def end(self) -> None:
+        """Raise Damaged if numbers are left, which a wrong count passes over."""
+        if self.place < len(self.words):
+            raise Damaged("a section holds more than it counts")
+
     def nodes(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Tags (n,) and places (n, 3) of nodes of format 2."""
         rows = self.take(4 * count, "f8").reshape(count, 4)
@@ -157,7 +169,9 @@ class _Numbers:
 
     def elements(self, count: int) -> Iterator[tuple[int, int, np.ndarray]]:
         """Kind, number of tags, and the tags and nodes of elements of format 2 that are alike."""
-        flat, size = self.take(len(self.words) - self.place), 1
+        first = self.place
+        flat, size = self.take(len(self.words) - first), 1
+        self.place = first
         while count and len(flat) > 2:
             kind, tags = flat[1:3].tolist()
             width = 3 + tags + _nodes_of(kind)
@@ -166,6 +180,7 @@ class _Numbers:
             own = len(rows) if alike.all() else int(np.argmin(alike))
             if not own:
                 return
+            self.place += own * width
             yield kind, tags, rows[:own, 3:]
             flat, count = flat[own * width :], count - own
             size = 2 * size if own == size else 1  # most rows are like the one above
@@ -191,6 +206,10 @@ class _Bytes(_Numbers):
             raise Damaged("a section ends early")
         return np.frombuffer(self.data, dtype, count, first)
 
+    def end(self) -> None:
+        if self.data[self.place :].strip():
+            raise Damaged("a section holds more than it counts")
+
     def line(self) -> int:
         first, self.place = self.place, self.data.index(b"\n", self.place) + 1
         return int(self.data[first : self.place])
@@ -213,17 +232,21 @@ class _Bytes(_Numbers):
 def _sections(path: Path) -> dict[str, _Numbers]:
     """The sections, from which numbers can be taken."""
     data, binary = path.read_bytes(), version(path)[1]
+    data = data[data.index(b"$MeshFormat") :]
     found: dict[str, _Numbers] = {}
-    one = data[data.index(b"\n", data.index(b"$MeshFormat") + 12) + 1 :][:4]
+    one = data[data.index(b"\n", 12) + 1 :][:4]
     order = ">" if one == b"\0\0\0\1" else "<"
     if binary and data.split(maxsplit=4)[3] != b"8":
         raise Damaged("its numbers are not of eight bytes")
     if b"$PartitionedEntities" in data:
         raise Damaged("it is a partitioned mesh; save it in one piece")
     for name in ("PhysicalNames", "Entities", "ParametricNodes", "Nodes", "Elements"):
-        start = data.find(f"${name}".encode())
+        key = f"\n${name}".encode()
+        start = data.find(key)
         if start >= 0:
-            start = data.index(b"\n", start) + 1
+            if data.find(key, start + 1) >= 0:
+                raise Damaged(f"it has two sections ${name}")
+            start = data.index(b"\n", start + 1) + 1
             end = data.find(f"$End{name}".encode(), start)
             part = data[start : end if end >= 0 else None]
             in_text = name == "PhysicalNames" or not binary
@@ -266,4 +289,5 @@ def _nodes(reader: _Numbers) -> tuple[np.ndarray, np.ndarray]:
         count = reader.count()
         tags.append(reader.take(count, "u8"))
         points.append(reader.take(count * width, "f8").reshape(count, width)[:, :3])
+    reader.end()
     return np.concatenate(tags), np.concatenate(points)

@@ -3,14 +3,15 @@ proximal loop.
 
 0. Where the problem has no plates, and the package was installed with a compiler: FIRST_SWEEPS
    sweeps of the nonsmooth Gauss-Seidel method, accelerated after Anderson, if they cost little.
-   Where stages 1 and 2 fail, the sweeps go on for twice as long. Where Q is a convolution,
+   Where stage 1 fails, the sweeps go on for twice as long. Where Q is a convolution,
    as of half-spaces: Newton's method on nested grids, while its residual falls.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
    circle near a solution, a few proximal steps break out of it.
-2. Where Q is sparse and singular: the sweeps of stage 0 from no force again, each of them
-   accelerated, since packings on which one of the two goes round in a circle seldom stop the other.
-   Then the proximal loop, as long as its subproblems are easy and each of them halves the residual.
+2. Where Q is sparse and singular: PLAIN_SWEEPS more sweeps that are not accelerated, since the
+   acceleration may go round in a circle, and the sweeps of stage 0 from no force again, each of
+   them accelerated. Then the proximal loop, as long as its subproblems are easy and each of them
+   halves the residual.
 3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
@@ -32,6 +33,7 @@ It ends where the driver's certificate or limits say so.
 import logging
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import count
 from typing import ClassVar
 
@@ -46,7 +48,7 @@ from contactopt.methods.kernels.alart_curnier import cold_start, coulomb_equatio
 from contactopt.methods.kernels.gauss_seidel import Sweeps
 from contactopt.methods.kernels.interior import Path, interior_iterates
 from contactopt.methods.kernels.sparse_blocks import block_matrix
-from contactopt.methods.kernels.states import StateTree, can
+from contactopt.methods.kernels.states import Point, StateTree, can
 from contactopt.methods.method import Iterate, Known, Method, at_rest
 from contactopt.methods.nested import Nested
 from contactopt.methods.newton import Newton
@@ -132,7 +134,9 @@ class _Swept:
         self.r = np.array(first, order="C")
 
     def points(self, most: int, between: int, budget: float) -> Iterator[Iterate]:
-        """Points that `most` sweeps reach within a number of multiplications: rough, then exact."""
+        """Points that `most` sweeps reach within a number of multiplications: rough, then exact.
+        Where `between` is 0, they are not accelerated.
+        """
         problem = self.problem
         explicit = has_entries(problem.Q)
         size = problem.Q.nnz if form(problem.Q) == "sparse" else problem.q.size**2
@@ -142,7 +146,7 @@ class _Swept:
             return
         if not (NSGS().solves(problem.law) and Sweeps.can(problem)):
             return
-        sweeps = Sweeps(problem, constants.SWEEPS_KEPT, between)
+        sweeps = Sweeps(problem, constants.SWEEPS_KEPT if between else 0, between)
         often = int(constants.MOMENT // cost) + 1
         done = self.reached(constants.NEARLY_SWEPT, sweeps, left, often)
         if not done:
@@ -174,9 +178,17 @@ class _Robust:
         self.loose = loose
         self.conic = AcaryCadoux().solves(problem.law) and not problem.law.dilatant
         self.evaluate = coulomb_equations(problem).evaluate
-        few = can(problem) and problem.contacts <= constants.MOST_STATES[problem.dim]
-        self.tree, self.met = StateTree(problem.explicit()) if few else None, False
-        self.branches = self.tree.points() if self.tree else iter(())
+        self.met = False
+
+    @cached_property
+    def tree(self) -> StateTree | None:
+        """The tree over the states of few contacts."""
+        few = self.problem.contacts <= constants.MOST_STATES[self.problem.dim]
+        return StateTree(self.problem.explicit()) if few and can(self.problem) else None
+
+    @cached_property
+    def branches(self) -> Iterator[Point | None]:
+        return self.tree.points() if self.tree else iter(())
 
     def better(self, *points: Iterate) -> Iterate:
         """The point with the least residual, the first of equal ones."""
@@ -186,9 +198,12 @@ class _Robust:
         self, start: Iterate | None, reached: Iterate
     ) -> Generator[Iterate | Known, None, None]:
         problem = self.problem
+        plain = self.swept.points(constants.PLAIN_SWEEPS, 0, np.inf)
         if self.loose and start is not None:
             reached = yield from self.proximal(start, constants.POLISH, constants.LEAST_ALPHA)
+            yield from plain
         elif self.loose:
+            yield from plain
             self.swept.r[:] = 0.0
             again = constants.FIRST_SWEEPS, constants.MORE_BETWEEN
             yield from self.swept.points(*again, constants.SWEEPING)
@@ -199,7 +214,7 @@ class _Robust:
                 reached = yield from self.proximal(
                     reached, 1, constants.LEAST_ALPHA, aim=residual / 2
                 )
-        yield from self.swept.points(constants.MORE_SWEEPS, constants.MORE_BETWEEN, np.inf)
+            yield from self.swept.points(constants.MORE_SWEEPS, constants.MORE_BETWEEN, np.inf)
         if self.conic:
             for full in (True, False):
                 path = interior_iterates(problem, self.matrix, Path(full))

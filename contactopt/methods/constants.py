@@ -7,9 +7,9 @@ from rounding, from the literature or from a proof stand beside the code that us
 """
 
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
-# Sweeps at first, and where Newton's method or the first proximal loop has failed; multiplications
-# that they may cost at first (1e6 take about a millisecond).
-FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 1000, 1e9
+# Sweeps at first, where Newton's method has failed, and those of sparse problems that are not
+# accelerated; multiplications that they may cost at first (1e6 take about a millisecond).
+FIRST_SWEEPS, MORE_SWEEPS, PLAIN_SWEEPS, SWEEPING = 500, 1000, 2000, 1e9
 LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
 QUICK = 2e5  # multiplications of a sweep up to which the first sweeps are one call
@@ -108,6 +108,9 @@ COARSE_ENOUGH = 3e-3  # residual at which a coarse grid has done its work, over 
 COARSEST_ENOUGH = 1e-4  # that of the coarsest grid, from which the others must not be led astray
 COARSE_STEPS = 30  # Newton steps on a coarse grid
 COARSE_TRIES = 80  # iterates of the default method on the coarsest grid, where Newton's steps fail
+# order of convergence that the accuracy of steps allows for: the contacts that change their state
+# spoil more than products can gain
+GRID_ORDER = 1.5
 CLOSER = 0.1  # residual of a given start that is taken, over that of the coarse grids' answer
 LEAST_SYMBOL = 1e-3  # value of the symbol that is inverted, over its median
 LEAST_DETERMINANT = 0.1  # of the two tangential symbols, over their product

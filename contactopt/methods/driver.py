@@ -25,7 +25,7 @@ from contactopt.methods import (
 from contactopt.methods.auto import Auto
 from contactopt.methods.method import Iterate, Known, Method, at_rest, dimensionless_start
 from contactopt.methods.newton import Newton
-from contactopt.methods.notes import collected, note, remark
+from contactopt.methods.notes import collected, dubious, note, remark
 from contactopt.methods.recorder import LEAST_PROOF, Limits, Recorder
 from contactopt.methods.small import solve_small
 from contactopt.problem import (
@@ -103,11 +103,14 @@ def solve(
     if not isinstance(time_limit, (int, float, np.number)) or not time_limit >= 0:
         raise InputError(f"time_limit must be a number of seconds, at least 0; got {time_limit!r}.")
     chosen = _method_for(problem, method, settings)
+    # what a few milliseconds may need, and a small problem needs no more than one call
+    small = progress is None and change_tol is None and max_iterations >= 1
+    small = small and time_limit >= LEAST_PROOF and chosen == USUAL
+    solution, swept = solve_small(problem, tol, start) if small else (None, None)
+    if solution is not None and not (exchanged.may(problem) or dubious(problem, solution)):
+        return solution
     limits = Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
-        solution, swept = None, None
-        if chosen == USUAL and limits.usual:
-            solution, swept = solve_small(problem, tol, start)
         if solution is None:
             solution = _run(problem, chosen, limits, start, swept)
         if solution.solved and exchanged.may(problem):

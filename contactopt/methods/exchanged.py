@@ -10,6 +10,7 @@ import logging
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.spatial import KDTree
 
 from contactopt.cards import count
@@ -17,6 +18,7 @@ from contactopt.checks import place_words
 from contactopt.linear.operators import form, has_entries
 from contactopt.methods.notes import note
 from contactopt.problem import InterfaceProblem, Solution, natural_map_residual
+from contactopt.problem.chart import UNNAMED
 from contactopt.problem.scaling import immovable
 
 # Contacts around a place that exchange forces, too: on quadratic elements an exchange falls to a
@@ -39,9 +41,11 @@ HARDER, ROUNDS, NEWTON, EPS = 10.0, 12, 60, 1e-14
 
 
 def may(problem: InterfaceProblem) -> bool:
-    """Whether contacts are at one place, or contacts of two pairs are neighbours: within three
-    times the largest spacing.
+    """Whether two contacts lie at one place, or contacts of two pairs are nearer to each other than
+    three times the largest spacing.
     """
+    if len(problem.pairs) < 2 and problem.pairs[0].name == UNNAMED:
+        return False
     if problem.shared_places:
         return True
     points = [problem.coordinates.T[pair.contacts] for pair in problem.pairs]
@@ -139,8 +143,8 @@ def exchanges(
         return own, *_shortened(felt, HARDLY_FELT[0])
     # y'Q y <= HARDLY_FELT and |V'y|^2 <= HARDLY_FELT hold on a space that contains the y looked for
     # and is found sooner, since the matrix is semidefinite
-    sizes, directions = np.linalg.eigh(scaled[own] + motions @ motions.T)
-    some = directions[:, sizes <= HARDLY_FELT[0]]
+    few = {"subset_by_value": (-np.inf, HARDLY_FELT[0])}  # in half the time of all
+    some = eigh(scaled[own] + motions @ motions.T, **few)[1]
     ways, sizes = _shortened(felt @ some, HARDLY_FELT[0])
     return own, some @ ways, sizes
 
@@ -164,7 +168,8 @@ def _with_least(
     changed[own] -= unfelt @ np.linalg.lstsq(scaled, changed[own] * weight, rcond=None)[0]
     chosen = changed.reshape(problem.q.shape)
     tangents = own % problem.dim > 0
-    sizes, ways = np.linalg.svd(unfelt[tangents], full_matrices=True)[1:]
+    rubbing = unfelt[tangents]
+    sizes, ways = np.linalg.svd(rubbing, full_matrices=len(rubbing) < rubbing.shape[1])[1:]
     alone = scaled[~tangents] @ ways[int(np.sum(sizes > SEEN)) :].T
     if not alone.size:
         return chosen, EMPTY

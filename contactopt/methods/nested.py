@@ -38,7 +38,7 @@ NEAR = 1e-8
 
 @dataclass(frozen=True)
 class Nested(Method):
-    """No settings."""
+    """A method without settings."""
 
     implicit: ClassVar[bool] = True
 

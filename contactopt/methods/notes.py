@@ -8,6 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+import numpy as np
+import scipy.linalg as la
+
 from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.certificate import amplification
@@ -15,7 +18,8 @@ from contactopt.problem.certificate import amplification
 # a remark is due if a small problem has so large a condition, and its forces so large an error
 FEW, WEDGED, MUCH = 50, 1e4, 1e-3
 LOOSE = 1e12  # condition above which rounding decides
-EXACT = 1e-11  # certificate that leaves no doubt below a condition of 1e8
+EXACT = 1e-11  # certificate that leaves no doubt below a condition of 1e8,
+DOUBTFUL = 1e-8  # whose inverse this is
 _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs", default=None)
 
 
@@ -38,17 +42,31 @@ def collected() -> Iterator[list[str]]:
         _notes.reset(token)
 
 
+def _nearly_singular(Q: np.ndarray) -> bool:
+    """Whether Q (n, n), with a diagonal of ones, has a condition at which EXACT leaves doubt."""
+    size = np.sqrt(np.abs(Q.diagonal()))
+    scaled = Q / np.outer(size, size) if size.all() else Q
+    factor, singular = la.lapack.dpotrf(scaled)
+    norm = np.abs(scaled).sum(axis=0).max(initial=0.0)
+    return bool(singular or la.lapack.dpocon(factor, norm)[0] < DOUBTFUL)
+
+
+def dubious(problem: InterfaceProblem, solution: Solution) -> bool:
+    """Whether the certificate of few contacts leaves a doubt that is worth its cost."""
+    if not solution.solved or problem.contacts > FEW or form(problem.Q) != "array":
+        return False
+    return solution.residual > EXACT or _nearly_singular(np.asarray(problem.Q))
+
+
 def remark(problem: InterfaceProblem, solution: Solution) -> None:
     """Say where the forces of a small problem may be far off although they are certified."""
-    at, loose = solution, solution.solved and solution.residual > EXACT
-    if not loose or problem.contacts > FEW or form(problem.Q) != "array":
+    if not dubious(problem, at := solution):
         return
     condition = amplification(problem, at.reactions, at.multipliers)
-    if condition <= WEDGED or condition * at.residual <= MUCH:
+    error = condition * max(at.residual, np.finfo(float).eps)
+    if condition <= WEDGED or error <= MUCH:
         return
-    why = (
-        f"by {min(condition * at.residual, 1.0):.0%} of the typical force, because the solution is"
-    )
+    why = f"by {min(error, 1.0):.0%} of the typical force, because the solution is"
     why += " nearly not unique"
     if not condition < LOOSE:
         if problem.shared_places:

@@ -30,12 +30,6 @@ class Limits:
     time_limit: float
     progress: Callable[[int, float], None] | None
 
-    @property
-    def usual(self) -> bool:
-        """Whether a solve of a few milliseconds that ends with its first iterate meets them."""
-        told = self.progress is not None or self.change_tol is not None
-        return not told and self.max_iterations >= 1 and self.time_limit >= LEAST_PROOF
-
 
 class Recorder:
     """Certificate, history and stopping rule of one solve. Without an iterate the answer is

@@ -1,5 +1,5 @@
 """Small problems of the default method in one call: the first sweeps of contactopt.methods.auto and
-the certificate, compiled and in the units of the problem (`certified` in kernels/sweeps.c). Sweeps
+the certificate, compiled and in the units of the problem (`solved` in kernels/sweeps.c). Sweeps
 need no scaling. What they do not solve goes on as without them, and so does everything where the
 package was installed without a compiler.
 """
@@ -13,7 +13,7 @@ from contactopt.methods import constants
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels import gauss_seidel
 from contactopt.methods.method import checked_start
-from contactopt.methods.notes import FEW
+from contactopt.methods.notes import EXACT, FEW
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.laws.coulomb import Coulomb
 
@@ -27,49 +27,50 @@ def solve_small(
     begin = time.perf_counter()
     if (given := arrays_of(problem)) is None:
         return None, None
-    cost = given[1][2].size + constants.LOCAL * problem.contacts
-    if cost > constants.QUICK:
+    k, dense = len(problem.q), not given[1][0].size
+    if given[1][2].size + constants.LOCAL * k > constants.QUICK:
         return None, None
-    # all digits cost less than the condition of few contacts (contactopt.methods.notes)
-    look = np.inf if problem.contacts <= FEW else constants.LOOK / cost
+    # more digits cost less than the condition of few contacts (contactopt.methods.notes)
+    enough = min(tol, EXACT) if dense and k <= FEW else tol
     first = None if start is None else checked_start(start, problem)[0]
-    residual, r = certified(given, constants.FIRST_SWEEPS, look, tol, first)
+    residual, rubs, r = certified(given, constants.FIRST_SWEEPS, enough, first)
     if not residual <= tol:
         return None, r
     seconds = time.perf_counter() - begin
     phases = {"solve": seconds, "certificate": 0.0, "checks": 0.0}
-    row = {"residual": residual, "change": float(r[:, 1:].any()), "seconds": seconds}
+    row = {"residual": residual, "change": rubs, "seconds": seconds}
     end = Status.SOLVED, residual, 1, NAME, (row,), phases, Status.SOLVED.sentence
     return Solution(r, np.zeros(0), *end), None
 
 
 def arrays_of(problem: InterfaceProblem) -> tuple[int, list[np.ndarray]] | None:
     """Dimension, rows of Q, friction and q for the compiled code; None if it cannot take them."""
-    if type(problem.law) is not Coulomb or not problem.q.size or len(problem.s):
+    Q, q, law = problem.Q, problem.q, problem.law
+    if type(law) is not Coulomb or not len(q) or len(problem.s):
         return None
-    kind, Q, none = form(problem.Q), problem.Q, gauss_seidel.NONE
-    if gauss_seidel.compiled("certified") is None or kind not in ("array", "sparse"):
+    kind = form(Q)
+    if gauss_seidel.compiled("solved") is None or kind not in ("array", "sparse"):
         return None
     if kind == "sparse":
         rows = Q.indptr.astype(np.int64), Q.indices.astype(np.int64), Q.data
     else:
-        rows = none, none, np.ascontiguousarray(Q)
-    both = np.ascontiguousarray(problem.law.coefficient), np.ascontiguousarray(problem.q)
-    return problem.dim, [*rows, *both]
+        rows = gauss_seidel.NONE, gauss_seidel.NONE, np.ascontiguousarray(Q)
+    return q.shape[1], [*rows, np.ascontiguousarray(law.mu), np.ascontiguousarray(q)]
 
 
 def certified(
     given: tuple[int, list[np.ndarray]],
     most: int,
-    look: float,
-    tol: float,
+    enough: float,
     r: np.ndarray | None = None,
-) -> tuple[float, np.ndarray]:
-    """The certificate after sweeps from r (k, dim), infinite if they diverge, and their forces."""
+) -> tuple[float, float, np.ndarray]:
+    """The certificate after sweeps from r (k, dim), infinite if they diverge; 1 if there is
+    friction; the forces.
+    """
     dim, arrays = given
     r = np.zeros(arrays[-1].shape) if r is None else np.array(r, float, order="C")
-    numbers = constants.NEARLY_SWEPT, constants.SWEPT, look, tol
+    numbers = constants.NEARLY_SWEPT, constants.SWEPT, enough
     kept = constants.SWEEPS_KEPT, constants.FIRST_BETWEEN
-    compiled = gauss_seidel.compiled("certified")
+    compiled = gauss_seidel.compiled("solved")
     assert compiled is not None
-    return float(compiled(dim, *arrays, r, *kept, most, *numbers)), r
+    return *compiled(dim, *arrays, r, *kept, most, *numbers), r

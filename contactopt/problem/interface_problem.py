@@ -185,7 +185,7 @@ class InterfaceProblem:
 
     @property
     def mu(self) -> np.ndarray:
-        """(k,) friction coefficients of the law, 0 where it has none."""
+        """The friction coefficients (k,) of the law; 0 where it has none."""
         return self.law.coefficient
 
     @cached_property
@@ -209,25 +209,27 @@ class InterfaceProblem:
 
     @cached_property
     def compliances(self) -> np.ndarray:
-        """(k,) mean positive diagonal of each block [length / force], or 0."""
+        """The mean (k,) of the positive diagonal entries of each block [length / force], or 0."""
         entries = np.asarray(diagonal(self.Q), dtype=float).reshape(self.q.shape)
         entries = np.where(entries > NOISE * entries.max(initial=0.0), entries, 0.0)
         return np.asarray(entries.sum(axis=1) / np.maximum(np.count_nonzero(entries, axis=1), 1))
 
     @cached_property
     def stiffnesses(self) -> np.ndarray:
-        """(k,) 1 over `compliances` [force / length], or 0."""
+        """One over each of the `compliances` (k,) [force / length]; 0 where these are 0."""
         c = self.compliances
         return np.divide(1.0, c, out=np.zeros(len(c)), where=c > 0)
 
     @cached_property
     def gaps(self) -> np.ndarray:
-        """(k,) lengths of q [length]."""
+        """The lengths (k,) of the vectors q at the contacts [length]."""
         return lengths(self.q)
 
     @cached_property
     def shared_places(self) -> list[np.ndarray]:
-        """The contacts at each place that has several, if the pairs have names."""
+        """The groups of contacts that lie at one place. Empty for a problem whose pairs have no
+        names.
+        """
         x = self.coordinates
         if x.shape[1] != self.contacts or self.contacts < 2 or self.pairs[0].name == UNNAMED:
             return []
@@ -244,7 +246,7 @@ class InterfaceProblem:
 
     @cached_property
     def reach(self) -> np.ndarray:
-        """(p,) largest entry of every column of V."""
+        """The largest size (p,) of the entries of each column of V."""
         return np.asarray(np.abs(self.V).max(axis=0, initial=0.0))
 
     def altered(self, **values: object) -> InterfaceProblem:

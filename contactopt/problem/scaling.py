@@ -21,7 +21,8 @@ from contactopt.problem.interface_problem import InterfaceProblem
 class Scales:
     """Units in which a problem is dimensionless: force, length, and one length per multiplier.
 
-    stretch  (k, dim - 1, dim - 1) what takes its tangential forces back (`isotropic`), or None
+    stretch  (k, dim - 1, dim - 1) the S of `isotropic`, which multiplies tangential forces to
+             get those of the problem; None where friction is the same in all directions
     basis    (p, m) of the multipliers that the dimensionless problem has, or None for all
     """
 
@@ -130,9 +131,9 @@ def without_rounding(V: np.ndarray) -> np.ndarray:
 
 
 def immovable(problem: InterfaceProblem) -> np.ndarray:
-    """The components (k dim,) that neither forces nor multipliers nor q move, and whose forces move
-    nothing, as a mask. A normal force that bounds the friction of a component that moves is none of
-    them: it matters.
+    """The mask (k dim,) of components that neither forces nor multipliers nor q move, and whose
+    forces move nothing. A normal force that bounds the friction of a moving component is not among
+    them.
     """
     d, law = np.abs(diagonal(problem.Q)), problem.law
     moves = [d, *np.abs(problem.V.T), np.abs(problem.q.ravel())]

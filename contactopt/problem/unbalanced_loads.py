@@ -33,8 +33,8 @@ FLAT = 1e-6  # share of the motion of the contacts below which they do not slide
 
 @dataclass(frozen=True, eq=False)
 class Escape:
-    """A motion z (p,) that moves the loads forward and that no contact resists: the least one, of
-    few bodies.
+    """The smallest motion z (p,), of few bodies, that moves the loads forward and that no contact
+    resists.
 
     strongest  number of the multiplier that moves furthest, of the body on which the loads do most
                work; where it turns without sliding, that of the rotation
@@ -85,7 +85,9 @@ def _described(problem: InterfaceProblem, s: np.ndarray, motion: np.ndarray) -> 
 
 
 def sorted_motions(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
-    """Orthogonal bases of the motions that contacts resist (p, m) and that nothing does (p, f)."""
+    """Orthogonal bases of the motions that contacts resist (p, m) and of those that nothing resists
+    (p, f).
+    """
     resists = np.repeat(problem.law.rough[:, None], problem.dim, axis=1)
     resists[:, 0] = True
     sizes, count = np.linalg.norm(problem.V, axis=0), len(problem.s)

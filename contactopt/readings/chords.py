@@ -204,7 +204,7 @@ def _heights(coupling: Coupling, ways: list[Way | None]) -> np.ndarray:
 def pressure_changes(reduction: Reduction, solution: Solution, d: np.ndarray) -> np.ndarray:
     """By how much the pressure changes, (k,) [stress], if the gap grows by d (k,) [length]."""
     problem = reduction.problem
-    u = problem.displacements(solution.reactions, solution.multipliers)[:, 0]
+    u = reduction.moved(solution)[:, 0]
     touching = problem.law.pressed(solution.reactions)
     near = (problem.areas > 0) & (touching | (u + d < 0))
     root = np.where(near, np.sqrt(np.maximum(problem.areas, 0.0)), 0.0)

@@ -111,7 +111,7 @@ def _along(normals: np.ndarray, points: np.ndarray, cells: np.ndarray) -> np.nda
 def contact_fields(reduction: Reduction, solution: Solution) -> tuple[ContactFields, ...]:
     """The ContactFields of each pair, in the order of the pairs."""
     problem, r = reduction.problem, solution.reactions
-    u, areas = problem.displacements(r, solution.multipliers), problem.areas
+    u, areas = reduction.moved(solution), problem.areas
     # the contact on an axis has no area
     share = np.divide(1.0, areas, out=np.zeros_like(areas), where=areas > 0)
     traction, status = space_forces(reduction, solution) * share, contact_status(problem, r)

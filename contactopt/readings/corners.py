@@ -15,7 +15,7 @@ import numpy as np
 from skfem import Mesh
 
 from contactopt.bodies.fields import Region
-from contactopt.bodies.views import stress_map
+from contactopt.bodies.views import elements_of, stress_map
 from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.cells import straight
@@ -24,7 +24,6 @@ from contactopt.meshes.structured import simplices
 from contactopt.problem import Solution
 from contactopt.readings.peaks import Peak, Reading, around, at_rim, nodal_pressure
 from contactopt.readings.resultants import views
-from contactopt.scenes.scene import Part, Scene
 
 RISE = 1.1  # by how much the pressure at a corner exceeds that of the contacts next to it, at least
 THERE = 0.05  # of the distance of contacts, within which a node is at the place of a contact
@@ -84,8 +83,9 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     joined = {name for pair in scene.pairs if bodies & {*pair.bodies} for name in pair.bodies}
 
     def filling(names: set[str], away: float) -> float:
-        parts = [part for name, part in scene.meshed.items() if name in names]
-        return sum(_share(part, scene, places[:, top], reach, away) for part in parts)
+        known = [elements_of(body) for body in reduction.bodies if body.name in names]
+        meshes = [body.basis.mesh for body in known if body is not None]
+        return sum(_share(mesh, places[:, top], reach, away) for mesh in meshes)
 
     images = 2 if bodies - scene.meshed.keys() else 1
     own_share = images * filling(bodies, 0.5)
@@ -99,12 +99,16 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     )
 
 
-def _share(part: Part, scene: Scene, place: np.ndarray, reach: float, away: float) -> float:
+def _share(mesh: Mesh, place: np.ndarray, reach: float, away: float) -> float:
     """The share of the full angle that a body fills around a place: `away` from its vertices."""
-    cells = simplices(straight(part.build_mesh(scene.elements, scene.zone)))
-    far = np.linalg.norm(cells.p - place[:, None], axis=0)
+    mesh = straight(mesh)
+    far = np.linalg.norm(mesh.p - place[:, None], axis=0)
     vertex = int(np.argmin(far))
-    return filled(cells, vertex) if far[vertex] <= reach else away
+    if far[vertex] > reach:
+        return away
+    near = np.flatnonzero(np.any(mesh.t == vertex, axis=0))
+    part, number = mesh.restrict(near, return_mapping=True, skip_boundaries=True)
+    return filled(simplices(part), int(np.flatnonzero(number == vertex)[0]))
 
 
 def re_entrant(mesh: Mesh, vertex: int) -> bool:

@@ -54,13 +54,15 @@ Read = tuple[float, float]  # a distance and its uncertainty
 Reader = Callable[[End], Read | None]
 
 
-def contact_area(scene: Scene, problem: InterfaceProblem, reactions: np.ndarray) -> float:
+def contact_area(
+    scene: Scene, problem: InterfaceProblem, reactions: np.ndarray, width: float
+) -> float:
     """The area on which one pair of surfaces touches, with all mirror images, around the axis or
-    over the thickness [length^2]: of the zone whose half-width is read, or of the nodes that touch.
+    over the thickness [length^2]: of the zone whose half-width (contact_edge) is read, or of the
+    nodes that touch.
     """
     touching = contact_status(problem, reactions).touching
     counted = float(problem.areas[touching].sum())
-    width = contact_edge(scene, problem, reactions)
     if width == _counted(scene, problem, touching) or _is_ring(scene, problem):
         return counted
     return (
@@ -301,7 +303,7 @@ def stick_width(reduction: Reduction, solution: Solution, zone: Read) -> Read:
     problem, r = reduction.problem, solution.reactions
     if not problem.law.sticking(r).any():
         return stick_edge(reduction.scene, problem, r)
-    slip = problem.displacements(r, solution.multipliers)[:, 1:]
+    slip = reduction.moved(solution)[:, 1:]
     return stick_edge(reduction.scene, problem, r, slip, zone)
 
 

@@ -5,6 +5,7 @@ meshes: the value at a peak comes from a fit through several nodes, weighted by 
 Every reading says how uncertain it is.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import combinations_with_replacement
 
@@ -23,6 +24,8 @@ from contactopt.readings.patches import least
 # may be missing. So read, 120 ellipses on random meshes were off by at most 2.3 times what is
 # claimed where one contact or more lies across the short half-axis.
 BESIDE = 1.0
+BESIDE_REACH = 3.01  # the neighbours of fitted contacts lie within three times their reach
+WINDOW = 16  # points of a grid on each side of a top, which its fit sees first
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +38,7 @@ class Peak:
     body, elements  where it lies inside a body: the number of the body and the elements around it
     sources, slopes  (s,) numbers of all contacts that were read, and the derivatives of a pressure
                      by the normal forces there [1 / area]
+    drop       by which share of the value it falls to the least of the contacts around it [-]
     """
 
     value: float
@@ -46,6 +50,7 @@ class Peak:
     elements: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
     sources: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=int))
     slopes: np.ndarray = field(default_factory=lambda: np.empty(0))
+    drop: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +92,9 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
     for top in (i for i in maxima(seen, largest_around(problem, seen)) if seen[i] > 0):
         peak = _fitted_top(problem, pressure, usable, top)
         uncertainty = peak.uncertainty + noise / float(problem.areas[top])
-        found.append(replace(peak, uncertainty=uncertainty))
+        near = around(problem, top)
+        drop = 1.0 - float(seen[near[usable[near]]].min() / seen[top])
+        found.append(replace(peak, uncertainty=uncertainty, drop=drop))
     found.sort(key=lambda peak: -peak.value)
     return Reading(found[0].value, found[0].uncertainty, tuple(found))
 
@@ -114,7 +121,9 @@ def around(problem: InterfaceProblem, contact: int) -> np.ndarray:
 
 
 def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:
-    """Numbers of places whose size is the largest around, the largest first, not by rounding."""
+    """Numbers of the places that are the largest around, the largest first. Differences of the size
+    of rounding do not change the order.
+    """
     chosen = np.flatnonzero(sizes >= (1 - EQUAL) * largest)
     order = np.round(sizes[chosen] / (EQUAL * sizes.max(initial=0.0) or 1.0))
     return chosen[np.argsort(-order, kind="stable")[:MOST_PEAKS]]
@@ -139,6 +148,23 @@ def _surroundings(problem: InterfaceProblem) -> tuple[np.ndarray, np.ndarray]:
     shifts = chart.period * np.array([-1.0, 0.0, 1.0])
     places = (chart.places[0] + shifts[:, None]).reshape(1, -1)
     return places, np.tile(np.arange(problem.contacts), 3)
+
+
+def _widening(
+    problem: InterfaceProblem, contact: int
+) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
+    """Places around a contact as in _surroundings(), and the distance up to which there are no
+    others: on a grid a window first, then all.
+    """
+    chart = problem.chart
+    if chart.grid is not None and not any(chart.mirrored) and chart.period is None:
+        at = np.unravel_index(contact, chart.grid)
+        ranges = [np.arange(n)[max(i - WINDOW, 0) : i + WINDOW + 1] for i, n in zip(at, chart.grid)]
+        node = np.ravel_multi_index(np.ix_(*ranges), chart.grid).ravel()
+        places = chart.places[:, node]
+        steps = np.ptp(places, axis=1) / [max(len(own) - 1, 1) for own in ranges]
+        yield places, node, WINDOW * float(steps.min())
+    yield *_surroundings(problem), np.inf
 
 
 def _fitted_top(
@@ -170,8 +196,10 @@ def _fitted_top(
 def _same_side(chart: Chart, contact: int) -> np.ndarray:
     """Whether contacts (k,) are on the same side as one of them, of a surface cut at corners."""
     k = chart.places.shape[1]
+    if chart.cells is None:
+        return np.ones(k, dtype=bool)
     place = chart.places[0] + 1j * chart.places[-1]  # one number sorts faster than two
-    if chart.cells is None or len(np.unique(place)) == k:
+    if len(np.unique(place)) == k:
         return np.ones(k, dtype=bool)
     mates = [chart.cells[[0, i]] for i in range(1, len(chart.cells))]
     piece = joined(np.concatenate(mates, axis=1), k)
@@ -185,17 +213,19 @@ def _fit_to(
     infinitely uncertain if these are too few or not all pressed. A weight w in v^2 is w / (2 v) in
     v.
     """
-    places, node = _surroundings(problem)
-    dim, offset = len(places), places - problem.chart.places[:, [top]]
     usable = usable & _same_side(problem.chart, top)
-    distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
-    near = least(distance, min(count, int(usable[node].sum())))
-    # of a zone that is long, and narrower than this, the contacts within it
     loaded = usable & (pressure > 0)
-    if dim > 1 and not np.all(loaded[node[near]]) and np.sum(loaded[node]) >= count:
-        near = least(np.where(loaded[node], distance, np.inf), count)
+    for places, node, radius in _widening(problem, top):
+        dim, offset = len(places), places - problem.chart.places[:, [top]]
+        distance = np.where(usable[node], np.linalg.norm(offset, axis=0), np.inf)
+        near = least(distance, min(count, int(usable[node].sum())))
+        # of a zone that is long, and narrower than this, the contacts within it
+        if dim > 1 and not np.all(loaded[node[near]]) and np.sum(loaded[node]) >= count:
+            near = least(np.where(loaded[node], distance, np.inf), count)
+        reach = float(distance[near].max(initial=0.0))
+        if BESIDE_REACH * reach <= radius and np.all(loaded[node[near]]):
+            break
     nodal, pressed, areas = float(pressure[top]), pressure[node[near]], problem.areas[node[near]]
-    reach = float(distance[near].max(initial=0.0))
     size = reach / max(len(near) / 2, 1) ** (1 / dim) or float(problem.areas[top] ** (1 / dim))
     # with a first coordinate of 1
     powers = list(combinations_with_replacement(range(dim + 1), 2))
@@ -214,8 +244,8 @@ def _fit_to(
     # rings at an axis bear little
     at_top *= min(1.0, float(np.sqrt(problem.areas[top] / areas.mean())))
     beside = 0.0
-    if dim > 1:  # the neighbours of all these contacts are within three times their reach
-        some = usable[node] & ((distance <= 3.01 * reach) | (len(near) < NEIGHBOURS[3]))
+    if dim > 1:
+        some = usable[node] & ((distance <= BESIDE_REACH * reach) | (len(near) < NEIGHBOURS[3]))
         beside = _beside_open(places, pressure[node], some, near)
     doubt = max(scatter / 2, at_top / 2, BESIDE * beside * nodal**2)
     if _outermost(offset[:, near]):

@@ -281,7 +281,7 @@ def read_place(place: Place, reduction: Reduction, solution: Solution) -> Readin
     weights, problem, r = pressure_weights(place, reduction), reduction.problem, solution.reactions
     near = np.flatnonzero(weights[:, 0])
     value, areas = float(np.sum(weights * r)), problem.areas[near]
-    apart = problem.displacements(r, solution.multipliers)[near, 0].min()
+    apart = reduction.moved(solution)[near, 0].min()
     missing = (
         f"there is no contact at ({_words(place.region)}): the surfaces are {apart:.3g} apart there"
         if not problem.law.pressed(r)[near].any()

@@ -37,6 +37,8 @@ def _resultant(reduction: Reduction, points: np.ndarray, forces: np.ndarray) -> 
         n, apart = plane.inward[:, None], plane.inward @ points - plane.offset
         points = np.hstack([points, points - 2 * n * apart])
         forces = np.hstack([forces, forces - 2 * n * (plane.inward @ forces)]) / 2
+    some = np.any(forces, axis=0)
+    points, forces = (np.compress(some, each, axis=1) for each in (points, forces))
     x, f = (np.pad(each, ((0, 3 - len(each)), (0, 0))) for each in (points, forces))
     moment = np.cross(x, f, axis=0).sum(axis=1)
     return Resultant(forces.sum(axis=1), moment if len(points) == 3 else moment[2:])
@@ -100,8 +102,9 @@ def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Sol
 
 
 def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
-    """For the name of each pair the components of the force on its upper body, without their unit,
-    from the summary of a result: normal forces of a curved surface add up to more than it.
+    """For each pair, by its name, the components of the force on its upper body as words without a
+    unit, from the summary of a result. The normal forces of a curved surface add up to more than
+    this force.
     """
     axes = KINDS[summary["kind"]].components
     words = {}
@@ -166,7 +169,7 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
             "friction_force": float(lengths(r[:, 1:]).sum()),
             "friction_bound": float(problem.law.bound_along(r).sum()),
             "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
-            "contact_area": contact_area(view.scene, problem, r),
+            "contact_area": contact_area(view.scene, problem, r, zone[0]),
             "contact_half_width": zone[0] if level else None,
             "stick_half_width": stick_width(view, own, zone)[0] if level else None,
             "coupling": view.coupling.kind,

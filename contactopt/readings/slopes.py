@@ -24,7 +24,7 @@ MOST = 3000  # contacts at which a reading is differentiated
 
 
 def of_pressure(state: State, pair: int) -> Seeds:
-    """The largest pressure of one pair, which its reading differentiates."""
+    """The largest pressure of one pair, with the derivatives of its reading."""
     reduction, solution = views(state.reduction, state.solution)[pair]
     reading, by_r = pressure_reading(reduction, solution), np.zeros(solution.reactions.shape)
     for peak in reading.peaks[:1]:

@@ -37,7 +37,7 @@ UNITS = {"strain": "", "rotation": " rad", "slip": " facets", "closure": " facet
 
 
 def overlap_share(reduction: Reduction, solution: Solution) -> float:
-    """By which share the areas of surfaces that overlap as drawn differ, weighted by forces."""
+    """By which share the areas of surfaces differ that overlap as drawn, weighted by forces."""
     shares = np.zeros(len(solution.reactions))
     ring = reduction.scene.kind == "axisymmetric"
     for pair, made in zip(reduction.problem.pairs, reduction.couplings):

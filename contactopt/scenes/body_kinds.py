@@ -116,7 +116,7 @@ class Part:
 
     @property
     def given(self) -> bool:
-        """Whether the mesh is given, not made for a number of elements."""
+        """Whether the mesh is given, and not made for a number of elements."""
         return not callable(self.mesh)
 
     def curve_of(self, boundary: str) -> Curve | None:
@@ -168,7 +168,7 @@ class Rigid:
         check_name("the body's name", self.name)
 
     def check_in(self, kind: str) -> None:
-        """As Part.check_in()."""
+        """Check what depends on the kind of the scene, as Part.check_in() does."""
         _check_motion(self, kind)
         if self.normal is None:
             return
@@ -230,12 +230,12 @@ class HalfSpace:
         return InputError(f"half-space '{self.name}': {why}")
 
     def check_in(self, kind: str) -> None:
-        """As Part.check_in()."""
+        """Check what depends on the kind of the scene, as Part.check_in() does."""
         _check_motion(self, kind)
 
     @property
     def given(self) -> bool:
-        """Whether the points are given, not made for a number of elements."""
+        """Whether the points are given, and not made for a number of elements."""
         return not callable(self.points)
 
     def ticks(self, elements: int, zone: float | None, axes: int) -> tuple[np.ndarray, ...]:

@@ -87,7 +87,7 @@ class Contact:
 
     @property
     def friction(self) -> str:
-        """The law and its number, for titles: 'mu = 0.3'."""
+        """The law and its number as words for titles, such as 'mu = 0.3'."""
         law = find_law(self.law)
         if not law.frictional:
             return self.law

@@ -18,7 +18,9 @@ STRESSES = {
 
 
 class Named(NamedTuple):
-    """A material with a name: its modulus E in a unit of stress; None: in that of the scene."""
+    """A material with a name. Its modulus E is in a unit of stress, or, if this is None, in that of
+    the scene.
+    """
 
     E: float
     nu: float

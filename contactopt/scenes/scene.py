@@ -144,7 +144,7 @@ class Scene:
 
     @property
     def friction(self) -> str:
-        """The laws and their numbers, for titles: 'mu = 0.3'."""
+        """The laws and their numbers as words for titles, such as 'mu = 0.3'."""
         return "; ".join(dict.fromkeys(pair.friction for pair in self.pairs))
 
     @property
@@ -233,7 +233,7 @@ class Scene:
 
     @property
     def given(self) -> bool:
-        """Whether the mesh of a body is given, not made for a number of elements."""
+        """Whether the mesh of a body is given, and not made for a number of elements."""
         return any(part.given for part in self.parts)
 
     def _check_form(self) -> None:

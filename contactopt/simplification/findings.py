@@ -50,7 +50,7 @@ class Simplification:
 
     @property
     def price(self) -> str:
-        """What it leaves, and what the error is, in words."""
+        """The size that remains, and the error, in words."""
         if self.exact:
             error = f"no error: the certificate of the whole scene is {self.proof:.0e}"
         elif self.folds:

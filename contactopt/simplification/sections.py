@@ -109,8 +109,9 @@ def _spoils(prism: _Prism) -> str:
             return f"the ends of body '{name}' are not held along the axis"
         for load in part.loads:
             values, acting = load.values(whole.scene.components), both[:0]
-            if "" in values:
-                acting = np.intersect1d(both, mesh.boundaries[load.boundary])
+            if "" in values:  # inside a body nobody knows its direction
+                sides = mesh.boundaries[load.boundary] if load.boundary else both
+                acting = np.intersect1d(both, sides)
             if values.get(component) or len(acting) or getattr(load, "direction", None):
                 where = f" on {load.boundary!r}" if load.boundary else ""
                 return f"the {load.what}{where} of body '{name}' acts along the axis"

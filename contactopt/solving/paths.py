@@ -72,7 +72,7 @@ class State:
 
     @property
     def friction(self) -> float:
-        """Friction work of this step, sum mu r_n |du_t| [force length]."""
+        """The work of friction in this step, sum mu r_n |du_t| [force length]."""
         return -float(np.sum(self.solution.reactions[:, 1:] * self.slip))
 
 
@@ -130,7 +130,7 @@ class PathResult:
 
     @property
     def solutions(self) -> list[Solution]:
-        """Those of all states, and that of the step that failed."""
+        """The solutions of all states, and that of the step that failed."""
         failed = [] if self.failed is None else [self.failed]
         return [*(state.solution for state in self.states), *failed]
 
@@ -140,7 +140,7 @@ class PathResult:
 
     @cached_property
     def history(self) -> dict[str, np.ndarray]:
-        """One value per state (n,), energies summed from the unloaded bodies on.
+        """One value per state (n,). Energies are sums from the unloaded bodies on.
 
         normal_force, shear_force    that press and push the upper body on the lower, the latter
                                      along t1 [force]

@@ -15,7 +15,7 @@ from contactopt.screen import PATIENCE
 def progress_lines(
     say: Callable[[str], None], problem: InterfaceProblem, tol: float
 ) -> Callable[[int, float], None]:
-    """A function that says one line per outer iteration, from PATIENCE seconds on."""
+    """A function that reports one line per outer iteration, from PATIENCE seconds on."""
     begin = time.perf_counter()
     before: list[tuple[float, float]] = []
     bodies = problem.Q.coupled if form(problem.Q) == "bodies" else None

@@ -24,7 +24,7 @@ def claims(table) -> str:  # type: ignore[no-untyped-def]
     liars = shares[shares["claimed"] - shares["kept"] > 0.05]
     return (
         f"A backend's word is not enough. Of {len(raw)} answers taken as they come at settings"
-        f" 1e-3 to 1e-9, {100 * raw['success'].mean():.0f} % keep the tolerance that was asked"
+        f" 1e-3 to 1e-9, {100 * raw['success'].mean():.0f} % reach the tolerance that was asked"
         f" for. {len(liars)} of {len(shares)} backends claim more than the certificate confirms"
         f" ({', '.join(sorted(liars.index)) or 'none'}). At default settings the median"
         f" residual over all backends is {default['residual'].median():.0e}."
@@ -41,7 +41,7 @@ def crossover(table) -> str:  # type: ignore[no-untyped-def]
         raise InputError("no problem is solved both as it comes and with active-set steps.")
     return (
         f"A crossover mends this. With active-set steps {100 * exact['success'].mean():.0f} %"
-        f" of {len(exact)} runs keep the tolerance, and the median residual is"
+        f" of {len(exact)} runs reach the tolerance, and the median residual is"
         f" {exact['residual'].median():.0e}. This changes the CPU time by"
         f" {100 * (cost.median() - 1):+.0f} % (median over sizes, all backends together)."
     )

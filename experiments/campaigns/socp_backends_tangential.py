@@ -16,7 +16,7 @@ def backends(table) -> str:  # type: ignore[no-untyped-def]
     raw, exact = (select(asked, **{"method.exact": value}) for value in (False, True))
     kept = raw.groupby("method.backend")["success"].mean()
     return (
-        "Answers of the conic backends as they come keep the tolerance asked for in"
+        "Answers of the conic backends as they come reach the tolerance asked for in"
         f" {100 * raw['success'].mean():.0f} % of {len(raw)} runs ("
         + ", ".join(f"{name} {100 * share:.0f} %" for name, share in kept.items())
         + f"). With active-set steps they keep it in {100 * exact['success'].mean():.0f} %."

@@ -151,12 +151,12 @@ assert np.allclose(
 # %% [markdown]
 # ## Why Coulomb's law has no energy
 #
-# Coulomb's law says that the bound is $g = \mu r_n$. Then no convex program has the solutions as its
-# minima, and there is not even an energy. This section shows why. It explains all the iterations of
-# this course.
+# Coulomb's law says that the bound is $g = \mu r_n$. This law has no convex energy, and not even one
+# that is not convex. This section shows why. It explains all the iterations of this course.
 #
 # **A convex energy makes forces fall.** Let the force be minus the slope of a convex function, $r =
-# -\varphi'(u)$. The slope of a convex function never decreases. So for any two states
+# -\varphi'(u)$. (At a kink, such as $u_t = 0$, every slope between those of the two sides is
+# allowed.) The slope of a convex function never decreases. So for any two states
 #
 # $$ (r - r')'(u - u') \;\le\; 0 . $$
 #
@@ -219,7 +219,16 @@ _ = right.set_yticks([0, 1])
 #   is what "quasi" means. With a fixed set this would be a convex program.
 # - *Complementarity.* Let $n$ be the unit vector of the normal direction. Find $r$ in the cone $|r_t|
 #   \le \mu r_n$ such that $u + \mu |u_t|\, n$ lies in the dual cone and is orthogonal to $r$. (The
-#   *dual cone* holds the vectors on which no force of the cone does negative work.)
+#   *dual cone* holds the vectors on which no force of the cone does negative work: $v_n \ge \mu
+#   |v_t|$.)
+#
+# The third form is Coulomb's law for this reason. The dual cone asks that $u_n + \mu |u_t| \ge \mu
+# |u_t|$, which is $u_n \ge 0$. Orthogonality says that $r_n u_n + (\mu r_n |u_t| + r_t u_t) = 0$.
+# Neither term is negative, so both are zero. The first is Signorini's condition. If the node slips,
+# the second leaves only $r_t = -\mu r_n u_t / |u_t|$.
+#
+# A problem with Coulomb's law may still have exactly one solution, as we shall see. Only the law has
+# no energy.
 #
 # ## Coulomb: the bound depends on the answer
 #
@@ -302,9 +311,10 @@ Slider(
 # $$ \min_r \; \tfrac12 r' Q r + q' r \qquad \text{subject to} \qquad |r_t| \le \mu\, r_n . $$
 #
 # This is a *second-order cone program* (SOCP), a convex program with a cone as its constraint.
-# `cvxpy` writes the cone as `cp.SOC`. The KKT conditions of this program are not Coulomb's law. In
-# them a node that slips by $u_t$ is also lifted, by $u_n = \mu |u_t|$. This law is called
-# *associated friction*.
+# `cvxpy` writes the cone as `cp.SOC`. The KKT conditions of this program are not Coulomb's law: $u =
+# Qr + q$ lies in the dual cone and is orthogonal to $r$, without the term $\mu |u_t|\, n$. On the
+# edge of the cone $r_t = \mp \mu r_n$, and orthogonality gives $u_n = \mu |u_t|$. So a node that slips
+# is also lifted. This law is called *associated friction*.
 
 # %%
 f = cp.Variable(2)
@@ -324,9 +334,9 @@ assert np.isclose(lifted[0], mu * abs(lifted[1]), atol=1e-4) and lifted[0] > 0.1
 
 # %% [markdown]
 # Acary and Cadoux found a repair. They add the term $\mu\, \sigma\, r_n$ to the cost, where $\sigma
-# = |u_t|$ is the slip of the last answer, and solve the program again and again. When nothing
-# changes any more, the added term has removed the lift, and the answer obeys Coulomb's law
-# (exercise 2.3).
+# = |u_t|$ is the slip of the last answer, and solve the program again and again. Its KKT conditions
+# have $u + \mu \sigma n$ in place of $u$. When nothing changes any more, this is the complementarity
+# above, so the answer obeys Coulomb's law (exercise 2.3).
 #
 # ## What fails
 #

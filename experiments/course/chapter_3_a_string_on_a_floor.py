@@ -146,9 +146,9 @@ left.plot(x, truth, "k-", lw=1, label="exact")
 left.set(xlabel="x [mm]", ylabel="gap [mm]")
 left.legend(frameon=False)
 right.plot(x, r.value * 40 / L, "C1.")
-right.axhline(f, color="k", lw=1, label="weight $f$")
-right.set(xlabel="x [mm]", ylabel="floor's force per length [N/mm]")
-right.legend(frameon=False, loc="lower center")
+right.axhline(f, color="k", lw=1)
+right.text(0.5, 1.03 * f, "weight $f$", ha="center")
+right.set(xlabel="x [mm]", ylabel="force per length [N/mm]", ylim=(None, 9.2))
 
 assert np.isclose(a, 0.25) and np.abs(u.value - truth).max() < 1e-3
 
@@ -308,9 +308,16 @@ assert gap.min() > 0 and errors[-1] < 5e-3
 #
 # $$ (P Q P' + \tfrac{1}{k_p} I)\, r = -P q . $$
 #
-# Both give the same answer. But $k_p$ enters in opposite ways. In the stiffness form it adds a
-# *large* number to some eigenvalues of $A$, so that the largest one grows with $k_p$. In the compliance
-# form it adds a *small* number, $1 / k_p$, to all eigenvalues of $Q_c = P Q P'$:
+# Both give the same answer. But $k_p$ enters in opposite ways. In the stiffness form a *large* number
+# stands on some entries of the diagonal. The largest eigenvalue is at least $A_{ii} + k_p$ at a
+# touching node $i$. The smallest is at most that of $A_f$, the block of $A$ for the free nodes,
+# because a shape that vanishes at the touching nodes does not feel the springs. So
+#
+# $$ \operatorname{cond} \;\ge\; \frac{A_{ii} + k_p}{\lambda_{\min}(A_f)} : $$
+#
+# it grows in proportion to $k_p$. (If all nodes touch, it does not: then $k_p$ is added to all
+# eigenvalues.) In the compliance form a *small* number, $1 / k_p$, is added to all eigenvalues of $Q_c
+# = P Q P'$:
 #
 # $$ \operatorname{cond} = \frac{\lambda_{\max}(Q_c) + 1/k_p}{\lambda_{\min}(Q_c) + 1/k_p} . $$
 #
@@ -332,7 +339,9 @@ soft = np.linalg.solve(A + k_p * P.T @ P, A @ np.full(len(x), d) - weight)
 forces = np.linalg.solve(Q_c + np.eye(len(Q_c)) / k_p, -P @ q)
 assert np.allclose(forces, -k_p * P @ soft)  # the same answer
 assert max(compliance_form) <= np.linalg.cond(Q_c) * (1 + 1e-9)
-assert stiffness_form[-1] > 1e4 * stiffness_form[0] / 10
+free = np.linalg.eigvalsh(A[np.ix_(~touching, ~touching)])[0]
+bound = (A[0, 0] + springs) / free
+assert np.all(stiffness_form > bound) and stiffness_form[-1] < 1.01 * bound[-1]
 
 # %% tags=["hide-input"]
 fig, ax = plt.subplots(figsize=(5.4, 3.4), layout="constrained")

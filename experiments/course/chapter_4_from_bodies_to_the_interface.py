@@ -137,9 +137,9 @@ assert 3 < np.sum(pressed > 1e-4) < len(x)
 # $$ u = Q\, r + q, \qquad Q = T K_{II}^{-1} T', \qquad q = T U_I^0 + g\, n, $$
 #
 # where $U_I^0$ is the solution without contact forces. $Q$ is the compliance of the surface: it
-# says how the surface moves under forces on the surface. It is also the inverse of the *Schur
-# complement*, which is the stiffness that remains when the inner unknowns are eliminated. Nothing
-# has been approximated.
+# says how the surface moves under forces on the surface. A column of $Q$ is the motion under a force
+# of 1 N at one node. $Q$ is also the inverse of the *Schur complement*, which is the stiffness that
+# remains when the inner unknowns are eliminated. Nothing has been approximated.
 
 # %%
 free = np.setdiff1d(np.arange(basis.N), held)
@@ -161,6 +161,16 @@ schur = K_free[np.ix_(places, places)] - K_free[
 print(f"{len(free)} free unknowns became {len(Q)}")
 
 assert np.allclose(S, schur)
+
+# %% tags=["hide-input"]
+order = np.argsort(x)
+fig, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
+for node, color in ((order[4], "C0"), (order[18], "C2")):
+    column = Q[::2, 2 * node]
+    ax.plot(x[order], column[order], color + ".-")
+    arrow(ax, (x[node], -0.2), (x[node], -0.03), "1 N", color)
+ax.set(xlabel="x [mm]", ylabel="normal displacement [mm]")
+_ = ax.set(ylim=(-0.22, 0.58))
 
 # %% [markdown]
 # ## Dual: forces on the contact alone

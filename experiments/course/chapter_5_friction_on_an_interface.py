@@ -311,11 +311,16 @@ Slider(
 #
 # So *every step is the same problem with another $q$*: subtract from $q_t$ what has slipped before.
 # The gap $u_n$ is not a difference, because contact has no memory. In the first step nothing has
-# slipped yet, and $u_t$ is the slip. This is what all programs above assume.
+# slipped yet, and $u_t$ is the slip. This is what all programs above assume. All forces are those at
+# the end of the step. (This is the *implicit Euler method*.)
 #
-# One step is as good as many if no contact changes the direction of its slip within it, and none
-# that has slipped sticks again. Otherwise the path matters. Here a node is pressed with 2 N, and
-# pulled to the right, to the left and to the right again.
+# One step is as good as many small ones if, at the end of the small ones, every closed contact has
+# either not moved sideways at all, or is slipping in the direction in which it has moved in total.
+# For these are the states that the law of the one step admits. Otherwise the path matters. It
+# matters for contacts that slip back, that stick after they have slipped, and that have moved
+# sideways before they touched. (An open contact has no friction, but $u_t^{\text{old}}$ contains
+# its motion, too.) Here a node is pressed with 2 N, and pulled to the right, to the left and to the
+# right again.
 
 
 # %%

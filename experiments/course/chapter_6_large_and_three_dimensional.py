@@ -66,12 +66,15 @@ for way, name in (
     ((0, 30, 0), "$t_2$"),
 ):
     ax.quiver(
-        48, -48, 0, *way, color="k", lw=1.8, arrow_length_ratio=0.25, zorder=3
+        -40, -44, 0, *way, color="k", lw=1.8, arrow_length_ratio=0.25, zorder=3
     )
-    ax.text(48 + 1.2 * way[0], -48 + 1.2 * way[1], 1.2 * way[2], name, zorder=3)
-ax.set(
-    xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]", box_aspect=(1, 1, 0.8)
-)
+    ax.text(
+        -40 + 1.2 * way[0], -44 + 1.2 * way[1], 1.2 * way[2], name, zorder=3
+    )
+ax.text(8, -4, -9, "20 mm", zorder=3)
+ax.text(22, 22, 18, "40 mm", zorder=3)
+ax.set_box_aspect((1, 1, 0.8), zoom=1.15)
+ax.set_axis_off()
 ax.view_init(elev=22, azim=-58)
 
 # %% [markdown]
@@ -336,7 +339,8 @@ _ = right.set(xlabel="node", yticks=(-1, 0, 1), title="two of its eigenvectors")
 # %% [markdown]
 # **Step 3: the paper makes it sparse.** Its equation (27) puts the distances into groups: 1; then 2
 # and 3; then 4 to 7; then 8 to 15. The group $2^{i-1} \le l \lt 2^i$ gets one distance, $2^i - 1$, with
-# the sum of its weights, $w_i = \sum_l 1 / l^2$. So a row has about $2 \log_2 m$ entries, and a product
+# the sum of its weights, $w_i = \sum_l 1 / l^2$. (For $l < m$ this differs from the weight of step 2
+# by at most the factor $\pi^2 / 4$.) So a row has about $2 \log_2 m$ entries, and a product
 # takes $O(m \log m)$ operations without any Fourier transform. The symbol is $\sum_i 2 w_i\, (1 - \cos
 # ((2^i - 1) \pi j / m))$.
 #
@@ -382,15 +386,18 @@ for ax, weights, title in zip(
 #
 # $$ P_{21} = \sum_b E_b' Q_b E_b . $$
 #
-# A displacement that vanishes at the ends of the contact is continued smoothly enough. Any other
-# displacement gets a jump. In the double integral, the pairs with one point inside and one
-# outside add a multiple of $\int |u|^2 / \text{(distance to the end)}$. On a mesh this is at most
-# $\max |u|^2$ times $\log N$. Continue $u$ by its mirror image instead, so that there is no jump.
-# The maximum is bounded by the seminorm of this function, up to another logarithm:
+# The body itself continues $u$ in the way that costs it the *least* energy. So the zero extension
+# costs at least as much. How much more? A displacement that vanishes at the ends of the contact is
+# continued smoothly enough. Any other displacement gets a jump. In the double integral, the pairs
+# with one point inside and one outside add a multiple of $\int |u|^2 / \text{(distance to the end)}$.
+# On a mesh this is at most $\max |u|^2$ times $\log N$. Continue $u$ by its mirror image instead. This
+# makes no jump, and costs at most a fixed multiple of the least energy. The maximum is bounded by the
+# seminorm of this function, up to another logarithm:
 #
 # $$ \max |u| \le |u_0| + \sum_{k \ne 0} |u_k| \le |u_0| + \Bigl( \sum_{0 < |k| \le N} \frac{1}{|k|} \Bigr)^{1/2} |u| \;\lesssim\; |u_0| + (2 \log N)^{1/2}\, |u| . $$
 #
-# So the extension makes the energy larger by at most a multiple of $\log^2 N$. This is the bound
+# So the extension makes the energy larger by at most a multiple of $\log^2 N$. (The mean $u_0$ has its
+# own place in the energy, because the body is held.) This is the bound
 # $O(\log^2 N)$ of the paper. *It comes from displacements that do not vanish at the ends.*
 
 # %% tags=["hide-input"]

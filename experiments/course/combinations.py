@@ -82,7 +82,7 @@ def quantity(
     exponents: tuple[float, ...] = (0, 1, -1, 2, -2) if len(known) <= 4 else (0, 1, -1)
     exponents += (0.5, -0.5) if len(known) <= 3 else ()
     powers = np.array(list(product(exponents, repeat=len(known))), dtype=float)
-    powers = powers[np.argsort(abs(powers).sum(axis=1), kind="stable")]
+    powers = powers[np.argsort(abs(powers).sum(axis=1), kind="stable")][1:]  # the first is all 0
     with np.errstate(invalid="ignore"):  # roots of negative numbers
         numbers = np.prod(np.array(list(known.values())) ** powers, axis=1)
     for factor, name in (
@@ -100,5 +100,5 @@ def quantity(
                     for one, power in zip(known, powers[k], strict=True)
                     if power
                 ]
-                return ANOTHER.format(name + " * ".join(parts or ["1"]))
+                return ANOTHER.format(name + " * ".join(parts))
     return None

@@ -149,7 +149,7 @@ GRADED = {
         ),
         (
             lambda: np.linalg.cond(string(4)[1] + np.eye(3) / 700),
-            "This is the compliance form. Asked is the stiffness form.",
+            "This is the compliance form. The exercise asks for the stiffness form.",
         ),
         (
             lambda: np.linalg.cond(string(4)[0] / 4 + 700 * np.diag([0, 1, 0])),

@@ -48,8 +48,8 @@ GRADED = {
         lambda: Numbers(
             angle(8),
             given={"pull": 50.0, "facets": 8.0, "right_angle": 90.0},
-            least=(0.0, "Asked is an angle between 0 and 90 degrees."),
-            most=(90.0, "Asked is an angle between 0 and 90 degrees."),
+            least=(0.0, "The exercise asks for an angle between 0 and 90 degrees."),
+            most=(90.0, "The exercise asks for an angle between 0 and 90 degrees."),
         ),
     ),
     "6.8": (

@@ -120,9 +120,10 @@ class Numbers:
             return RIGHT
         if not self.counts and self._rounded(answer, value):
             return DIGITS
-        for other, told in listed:
-            if " " in told and self.resembles(answer, other):
-                return wrong("mistake", told)
+        for same in (self.agrees, self.resembles):  # another mistake may have the same two digits
+            for other, told in listed:
+                if " " in told and same(answer, other):
+                    return wrong("mistake", told)
         if value.size == 1:
             alone = float(answer.ravel()[0])
             return self._one(alone, 0, listed) or self._size(answer, value)
@@ -303,8 +304,8 @@ class Numbers:
         """The last word: in which direction the answer is off."""
         a, b = float(abs(answer).max()), float(abs(value).max())
         if a > 2 * b or b > 2 * a:
-            told = "more than twice as large as it should be" if a > b else "less than half of it"
-            return wrong("size", f"Your answer is {told}.")
+            told = "more than twice" if a > b else "less than half"
+            return wrong("size", f"Your answer is {told} as large as it should be.")
         if np.allclose(answer, value, rtol=0, atol=0.03 * b):
             return wrong(
                 "near", "You are within 3 percent: a small term is missing, or some digits."

@@ -306,7 +306,7 @@ def draw_times(rows: list[Row]) -> Any:
         way = -1 if colour == BLUE else 1  # of the label
         side = {"xytext": (4 * way, 3), "textcoords": "offset points", "annotation_clip": False}
         side["ha"] = "right" if way < 0 else "left"
-        ax.annotate(name, (row["cpu"], row["drawn"]), color=colour, fontsize=LETTERS - 1, **side)
+        ax.annotate(name, (row["cpu"], row["drawn"]), color=colour, fontsize=LETTERS, **side)
     ax.text(0.98, 0.97, "penalty", color=ORANGE, transform=ax.transAxes, ha="right", va="top",
             fontsize=LETTERS)  # fmt: skip
     ax.text(0.98, 0.89, "augmented Lagrangian", color=BLUE, transform=ax.transAxes, ha="right",

@@ -195,11 +195,14 @@ def draw(rows: list[dict], sizes: tuple[int, ...]) -> Any:
                     ax.loglog(k, y, style, color=colour, mfc="white" if "--" in style else colour)
                     ends.append((k[-1], y[-1], name + suffix, colour))
         if key.startswith("condition"):
-            growth = [np.log(k) ** 2 for k in sizes]
-            ax.loglog(sizes, growth, ":", color=COLOURS[6])
-            ends.append((sizes[-1], growth[-1], r"$\log^2 N$ (paper)", COLOURS[6]))
+            shown = [k for k in sizes if k <= max(end[0] for end in ends)]
+            growth = [np.log(k) ** 2 for k in shown]
+            ax.loglog(shown, growth, ":", color=COLOURS[6])
+            ends.append((shown[-1], growth[-1], r"$\log^2 N$ (paper)", COLOURS[6]))
+        else:
+            shown = list(sizes)
         ax.set(xlabel="contacts $N$ [-]", ylabel=key.replace(", full", "") + " [-]")
-        ax.set_xticks(sizes, [str(k) for k in sizes], rotation=45)
+        ax.set_xticks(shown, [str(k) for k in shown], rotation=45)
         ax.set_xticks([], minor=True)
         set_ticks(ax.yaxis)
         label_ends(ax, ends)

@@ -93,7 +93,7 @@ def path_is(drawn: bool) -> Callable[..., bool]:
 
 
 def sweeps(most: int) -> Callable[..., bool]:
-    return lambda swept, number, budget: number == most
+    return lambda swept, number, *more: number == most
 
 
 ROBUST, SWEPT = auto._Robust, auto._Swept
@@ -110,6 +110,7 @@ STAGES: dict[str, tuple[Any, str, Callable[..., Any], Callable[..., bool]]] = {
         lambda *given, **more: "aim" in more,
     ),
     "more sweeps": (SWEPT, "points", nothing, sweeps(constants.MORE_SWEEPS)),
+    "plain sweeps": (SWEPT, "points", nothing, sweeps(constants.PLAIN_SWEEPS)),
     "interior path": (*INTERIOR, path_is(drawn=False)),
     "proof that there is no solution": (auto, "infeasibility", lambda problem: None, every),
     "tree over the states": (ROBUST, "searched", nothing, every),

@@ -82,8 +82,8 @@ def of_set(
     testset: str, folder: Path, tier: str = "", tags: str = "", every: int = 1
 ) -> list[Problem]:
     """The problems that an entry `testset = ...` of an experiment file means; InputError if there
-    are none. `tags` are conditions with commas between them. Only each so-manieth problem is taken,
-    as `every` says, for a quick look at the whole set.
+    are none. `tags` are conditions with commas between them. For a quick look `every` = n takes
+    only every n-th problem.
     """
     check_count("every", every)
     found = problems(tier, [text for text in tags.split(",") if text.strip()], testset, folder)

@@ -65,7 +65,9 @@ def _short(value: float) -> float | None:
 
 
 def invariants(given: InterfaceProblem | Sequence) -> dict[str, float]:
-    """Norms of q, Q x, V' x (x_i = cos i), s and mu, of all states, to ten digits."""
+    """Norms that identify a problem: of q, Q x, V' x (x_i = cos i), s and mu, of all states, to ten
+    digits.
+    """
     states = states_of(given)
     x = np.cos(np.arange(states[0].q.size))
     parts = {

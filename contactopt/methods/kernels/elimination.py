@@ -18,12 +18,12 @@ from contactopt.problem import InterfaceProblem
 
 
 def eliminated(level: Level, at: Evaluation) -> Evaluation:
-    """Solve alone the contacts that make most of the residual; returns errors and forces."""
+    """Solve alone the contacts with most of the residual; returns errors and forces."""
     some = _worst(level, at)
     if not len(some) or len(level.components) < level.kernel.dim:
         return at
     (r, lam), Q = at.point, level.kernel.entries(some)
-    moved = (level.product(r) + level.V @ lam + level.q)[:, some].T
+    moved = at.moved[:, some].T
     begin = np.ascontiguousarray(r[:, some].T)
     q = moved - (Q @ begin.ravel()).reshape(begin.shape)
     found = _solution(InterfaceProblem(Q, q, level.law.select(some)), begin)

@@ -3,7 +3,8 @@ with a compiler.
 
 The formulas are those of contactopt.methods.nsgs, which does the same in Python, much more slowly.
 Sweeps may be accelerated: some of them then start from the combination of the last results whose
-changes would cancel best (Anderson's acceleration).
+changes would cancel best (Anderson's acceleration). In the plane the sweeps find the states of the
+contacts, and elimination the forces that fit them, which the next sweep confirms or not.
 
 Sources: Walker, Ni (2011), Anderson acceleration for fixed-point iterations; Pratapa,
 Suryanarayana, Pask (2016) for the steps between.

@@ -3,18 +3,19 @@
 
 A step solves (I - D) dr + D rho (Q dr + V dlambda) = error, V' dr = -balance on the contacts with D
 != 0; all others have dr = error. Products with Q are taken in single precision. Where every closed
-contact has D = I the system is symmetric and solved by projected PCG, otherwise by GMRES, both
-preconditioned by the inverse of the symbol of Q on the grid without padding, restricted to the
-contacts that are closed and to the directions that are held.
+contact has D = I the system is symmetric and solved by projected PCG, otherwise by GMRES, whose
+residual is that of Newton's equations. Both are preconditioned by the inverse of the symbol of Q on
+the grid without padding, restricted to the contacts that are closed and to the directions that are
+held.
 """
 
 import logging
 from collections.abc import Callable
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, gmres
 
-from contactopt.linear.flexible_gmres import RESTART, RUNS
+from contactopt.linear.flexible_gmres import flexible_gmres
+from contactopt.linear.stacked import norm
 from contactopt.methods import constants
 from contactopt.methods.constants import FIRST_SHIFT, SHIFT_RATIO
 from contactopt.methods.kernels.elimination import eliminated
@@ -37,7 +38,7 @@ class GridSteps:
     def __init__(self, level: Level, enough: float, least: float = 0.0):
         self.level, self.enough, self.least = level, enough, least
         loosest = constants.LOOSEST
-        self.accuracy = Forcing(loosest, loosest, constants.TIGHTEST)
+        self.accuracy = Forcing(loosest, loosest, constants.TIGHTEST, constants.GRID_ORDER)
 
     def near(self, r: np.ndarray) -> float:
         """The residual that is enough at forces r."""
@@ -123,36 +124,30 @@ def _unsymmetric(
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """(I - D) dr + D rho (Q dr + V dlambda) = error - D rho Q known, V' dr = balance, by GMRES."""
     (c, m), act, V = (len(known), len(at.closed)), _act(level, at), level.V[:, at.closed]
-    p, n = len(balance), c * m
-
+    n, p, used = c * m, len(balance), 0
     D = np.ascontiguousarray(at.D.transpose(1, 2, 0))
 
     def rows(dr: np.ndarray, w: np.ndarray) -> np.ndarray:
         return np.asarray(dr - np.einsum("abk,bk->ak", D, dr - level.rho * w))
 
-    def system(x: np.ndarray) -> np.ndarray:
-        x = x.ravel()
-        dr = x[:n].reshape(c, m)
-        left = rows(dr, act(dr) + V @ x[n:]).ravel()
+    def system(x: np.ndarray, others: np.ndarray | None = None) -> np.ndarray:
+        nonlocal used
+        used += 1
+        dr = np.asarray(x[:n], float).reshape(c, m)
+        left = rows(dr, act(dr, others) + V @ x[n:]).ravel()
         return np.concatenate([left, np.einsum("ckp,ck->p", V, dr)])
 
     DrhoV = level.rho * np.einsum("kab,bkp->akp", at.D, V).reshape(n, p)
     border = Border(_rough_inverse(level, at), DrhoV, V.reshape(n, p))
-    iterations: list[float] = []
-    none = np.zeros((c, m))
-    shift = rows(none, act(none, known))
-    right = np.concatenate([(at.error[:, at.closed] - shift).ravel(), balance])
-    x, _ = gmres(
-        LinearOperator((n + p, n + p), matvec=system, dtype=float),
-        right,
-        rtol=rtol,
-        restart=min(n + p, RESTART),
-        maxiter=RUNS,
-        M=LinearOperator((n + p, n + p), matvec=lambda x: border.solve(x.ravel()), dtype=float),
-        callback=iterations.append,
-        callback_type="pr_norm",
-    )
-    return x[:n].reshape(c, m), x[n:], len(iterations)
+    right = np.concatenate([at.error[:, at.closed].ravel(), balance])
+    x, rest = 0 * right, right
+    if np.any(known):  # one product for the known changes and a first guess of the others
+        x = border.solve(right)
+        rest = right - system(x, known)
+    goal = rtol * norm(right) / (norm(rest) or 1.0)
+    if goal < 1:
+        x = x + flexible_gmres(system, border.solve, rest, np.ones(len(right)), goal)
+    return x[:n].reshape(c, m), x[n:], used
 
 
 def _rough_inverse(level: Level, at: Evaluation) -> Act:

@@ -133,7 +133,7 @@ class Level:
             moves = np.any(D != 0, axis=(1, 2))
             closed, D = busy[moves], D[moves]
         balance = np.einsum("ckp,ck->p", self.V, r) + self.s
-        return Evaluation((r, lam), error, balance, closed, D)
+        return Evaluation((r, lam), u, error, balance, closed, D)
 
     @cached_property
     def inverse(self) -> Symbols:
@@ -194,9 +194,12 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Errors at a point: error (c, k), balance (p,), m contacts with a derivative D (m, c, c)."""
+    """Displacements u (c, k) and errors at a point: error (c, k), balance (p,), m contacts with a
+    derivative D (m, c, c).
+    """
 
     point: Point
+    moved: np.ndarray
     error: np.ndarray
     balance: np.ndarray
     closed: np.ndarray

@@ -68,13 +68,14 @@ def newton_iterates(system: System[At], at: At, damped: bool = False) -> Iterato
 @dataclass
 class Forcing:
     """The relative accuracy of the linear system of a Newton step that is worth its price: `first`
-    for the first step, then between `loosest` and `tightest`. The step that ends a solve need not
-    come further than that asks.
+    for the first step, then between `loosest` and `tightest`, for convergence of an `order` between
+    1 and 2. The step that ends a solve need not come further than that asks.
     """
 
     first: float
     loosest: float
     tightest: float
+    order: float = 2.0
     last: float = np.inf  # residual before the last step
     accuracy: float = field(init=False)  # of that step
 
@@ -86,7 +87,9 @@ class Forcing:
         if self.last in (0.0, np.inf):
             worth = self.first if self.last else self.tightest
         else:
-            worth = min(self.loosest, max(self.tightest, 0.5 * (residual / self.last) ** 2))
+            worth = min(
+                self.loosest, max(self.tightest, 0.5 * (residual / self.last) ** self.order)
+            )
         self.last = residual
         self.accuracy = max(worth, min(LAST_LOOSEST, LAST_SHARE * enough()))
         return self.accuracy

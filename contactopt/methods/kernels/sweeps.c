@@ -19,6 +19,10 @@ columns[place]. An array has no such places. */
 #define GROWN 2.0    /* a change so many times the least so far ends what is remembered */
 #define EASY 50       /* sweeps of which each may be accelerated */
 #define LITTLE 1e-13 /* of the identity, beside products of unit vectors */
+#define RIDGE 1e-12  /* of the identity, over the mean of the diagonal */
+#define CLIPPED 1e-9 /* share of mu r_n that friction may lack and still slip */
+#define FEWEST 3     /* sweeps before the states are worth a look */
+#define LOCAL 100.0  /* multiplications that a local problem and the acceleration are worth */
 
 typedef struct {
     double compliance, S[4], w[2], tn[2], mu, level;
@@ -290,27 +294,119 @@ static void extrapolate(Memory *past, double *r)
             r[i] -= c[j] * past->moves[j * past->n + i];
 }
 
+/* In the plane the states of contacts in r, unless others follow, make their forces linear: r = 0
+where they are open, else u_n = 0, and u_t = 0 where they stick, r_t = +-mu r_n where they slip.
+x, the forces that solve this, by elimination. A little of the identity keeps forces that move
+nothing as they are in r. Returns whether this took at most `most` multiplications and worked. */
+static int settle(const Matrix *Q, const double *q, const Local *at, const double *r, double most,
+                  double *x)
+{
+    Py_ssize_t n = 2 * Q->k, m = 0;
+    Py_ssize_t *row = malloc(2 * n * sizeof(Py_ssize_t) + 1), *column = row + n;
+    for (Py_ssize_t j = 0; row && j < n; j++) {
+        double bound = at[j / 2].mu * r[j - j % 2];
+        int fixed = !(r[j - j % 2] > 0) || (j % 2 && fabs(r[j]) >= bound * (1 - CLIPPED));
+        column[j] = fixed ? -1 : m;
+        if (!fixed)
+            row[m++] = j;
+        if (at[j / 2].bilateral)
+            most = 0.0;
+    }
+    Py_ssize_t wide = m + 1;
+    double *A = row && m * m * (m / 3.0 + 1) <= most ? calloc(m * wide + 1, sizeof(double)) : NULL;
+    int fine = A != NULL;
+    double sum = 0.0;
+    for (Py_ssize_t a = 0; fine && a < m; a++) {
+        int64_t j = row[a], from = Q->first ? Q->first[j] : j * n;
+        int64_t to = Q->first ? Q->first[j + 1] : from + n;
+        double *line = A + a * wide;
+        for (int64_t place = from; place < to; place++) {
+            int64_t c = Q->first ? Q->columns[place] : place - from;
+            if (column[c] >= 0)
+                line[column[c]] += Q->entries[place];
+            else if (r[c - c % 2] > 0)
+                line[column[c - 1]] += Q->entries[place] * copysign(at[c / 2].mu, r[c]);
+        }
+        line[m] = -(q[j] + row_times(Q, n, j, r));
+        sum += fabs(line[a]);
+    }
+    for (Py_ssize_t a = 0; fine && a < m; a++)
+        A[a * wide + a] += RIDGE * sum / m;
+    for (Py_ssize_t a = 0; fine && a < m; a++) {
+        double *lead = A + a * wide;
+        Py_ssize_t best = a;
+        for (Py_ssize_t b = a + 1; b < m; b++)
+            best = fabs(A[b * wide + a]) > fabs(A[best * wide + a]) ? b : best;
+        for (Py_ssize_t c = a; best > a && c <= m; c++) {
+            double other = A[best * wide + c];
+            A[best * wide + c] = lead[c], lead[c] = other;
+        }
+        fine = lead[a] != 0;
+        for (Py_ssize_t b = a + 1; fine && b < m; b++) {
+            double *line = A + b * wide, share = line[a] / lead[a];
+            for (Py_ssize_t c = a + 1; share != 0 && c <= m; c++)
+                line[c] -= share * lead[c];
+        }
+    }
+    memcpy(x, r, n * sizeof(double));
+    for (Py_ssize_t a = m - 1; fine && a >= 0; a--) {
+        double *line = A + a * wide, step = line[m];
+        for (Py_ssize_t c = a + 1; c < m; c++)
+            step -= line[c] * A[c * wide + m];
+        line[m] = step / line[a];
+        x[row[a]] += line[m];
+    }
+    for (Py_ssize_t i = 0; fine && i < n; i += 2)
+        if (column[i] >= 0 && column[i + 1] < 0)
+            x[i + 1] = x[i] * copysign(at[i / 2].mu, r[i + 1]);
+    free(A), free(row);
+    return fine;
+}
+
+/* One sweep from r, and its changes f; their norm over that of the forces. */
+static double changed(int dim, double share, const Matrix *Q, const double *q, Local *at, double *r,
+                      double *f)
+{
+    Py_ssize_t n = Q->k * dim;
+    memcpy(f, r, n * sizeof(double));
+    sweep_once(dim, share, Q, q, at, r);
+    for (Py_ssize_t i = 0; i < n; i++)
+        f[i] = r[i] - f[i];
+    double moved = dot(f, f, n), size = dot(r, r, n);
+    return size == 0 && moved == 0 ? 0.0 : sqrt(moved / size);
+}
+
 /* At most `count` sweeps, fewer where one changes the forces by no more than `enough` of them; r is
 the result of the last one. Returns its change over the forces, infinite if these have vanished, and
-sets `count` to the number of sweeps. */
+sets `count` to the number of sweeps. Accelerated ones in the plane may end by `settle`, which never
+costs more than the sweeps before, and a third of them after it was in vain. */
 static double sweep_over(int dim, Py_ssize_t *count, double share, double enough, const Matrix *Q,
                          const double *q, Local *at, double *r, double *f, Memory *past)
 {
-    double change = INFINITY;
+    double change = INFINITY, spent = 0.0, patience = 1.0;
     Py_ssize_t n = Q->k * dim, done = 0;
+    double cost = (Q->first ? (double)Q->first[n] : (double)n * n) + LOCAL * Q->k;
+    double *x = dim == 2 && past->most && enough >= 0 ? malloc(n * sizeof(double) + 1) : NULL;
     while (done < *count && change > enough) {
         if (past->most && (done < EASY || *past->since >= past->between))
             extrapolate(past, r);
-        memcpy(f, r, n * sizeof(double));
-        sweep_once(dim, share, Q, q, at, r);
-        for (Py_ssize_t i = 0; i < n; i++)
-            f[i] = r[i] - f[i];
-        double moved = dot(f, f, n), size = dot(r, r, n);
-        change = size == 0 && moved == 0 ? 0.0 : sqrt(moved / size);
+        change = changed(dim, share, Q, q, at, r, f);
         if (past->most)
             remember(past, r, f);
-        done++;
+        done++, spent += cost;
+        if (x == NULL || done < FEWEST || change <= enough ||
+            !settle(Q, q, at, r, spent / patience, x))
+            continue;
+        double after = changed(dim, share, Q, q, at, x, f);
+        spent = 0.0;
+        if (after < change / 2) {
+            memcpy(r, x, n * sizeof(double));
+            change = after, patience = 1.0;
+            forget(past);
+        } else
+            patience *= 3;
     }
+    free(x);
     *count = done;
     return change;
 }
@@ -479,14 +575,14 @@ static double certificate(int dim, const Matrix *Q, const double *q, const doubl
     return isfinite(worst) ? worst : INFINITY;
 }
 
-static PyObject *certified(PyObject *self, PyObject *args)
+static PyObject *solved(PyObject *self, PyObject *args)
 {
     int dim, most, between;
     Py_ssize_t count, more;
-    double nearly, swept, look, tol, change = INFINITY, residual = INFINITY;
+    double nearly, swept, enough, change, residual = INFINITY, rubs = 0.0;
     Py_buffer first, columns, entries, mu, q, r;
-    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*w*iindddd", &dim, &first, &columns, &entries, &mu, &q,
-                          &r, &most, &between, &count, &nearly, &swept, &look, &tol))
+    if (!PyArg_ParseTuple(args, "iy*y*y*y*y*w*iinddd", &dim, &first, &columns, &entries, &mu, &q,
+                          &r, &most, &between, &count, &nearly, &swept, &enough))
         return NULL;
     Py_ssize_t k = mu.len / (Py_ssize_t)sizeof(double), n = k * dim;
     Matrix Q = {entries.buf, first.len ? first.buf : NULL, columns.buf, k};
@@ -498,27 +594,27 @@ static PyObject *certified(PyObject *self, PyObject *args)
         Memory past = memory_in(room + 3 * n, most, between, n);
         prepare(dim, &Q, q.buf, mu.buf, diag, at);
         change = sweep_over(dim, &count, 1.0, nearly, &Q, q.buf, at, r.buf, f, &past);
-        if (change <= nearly && count > look)
+        if (change <= nearly || count == 0)
             residual = certificate(dim, &Q, q.buf, mu.buf, diag, r.buf, d);
-        if (change <= nearly && !(residual <= tol)) {
+        if (change <= nearly && !(residual <= enough)) {
             more = 2 * count; /* the last digits take less than the first */
             sweep_over(dim, &more, 1.0, swept, &Q, q.buf, at, r.buf, f, &past);
             residual = certificate(dim, &Q, q.buf, mu.buf, diag, r.buf, d);
         }
-        if (count == 0)
-            residual = certificate(dim, &Q, q.buf, mu.buf, diag, r.buf, d);
+        for (Py_ssize_t i = 0; i < n; i++)
+            rubs = i % dim && ((double *)r.buf)[i] != 0 ? 1.0 : rubs;
         Py_END_ALLOW_THREADS;
     }
     free(room), free(at);
     PyBuffer_Release(&first), PyBuffer_Release(&columns), PyBuffer_Release(&entries);
     PyBuffer_Release(&mu), PyBuffer_Release(&q), PyBuffer_Release(&r);
-    return at == NULL ? PyErr_NoMemory() : PyFloat_FromDouble(residual);
+    return at == NULL ? PyErr_NoMemory() : Py_BuildValue("dd", residual, rubs);
 }
 
 static PyMethodDef functions[] = {
-    {"certified", certified, METH_VARARGS, "Sweep a problem in any units until most digits are there,"
-     " and, unless the certificate is good then (`look`: sweeps that are worth one), all; the"
-     " certificate, infinite where they do not converge. Without sweeps, that of r."},
+    {"solved", solved, METH_VARARGS, "Sweep a problem in any units until most digits are there,"
+     " and, unless the certificate is `enough` then, all; the certificate, infinite where they do"
+     " not converge, and 1 if there is friction. Without sweeps, that of r."},
     {"sweep", sweep, METH_VARARGS,
      "Sweep at most `count` times over all contacts; the last change over the forces, the sweeps."},
     {NULL, NULL, 0, NULL}};

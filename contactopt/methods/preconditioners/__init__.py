@@ -103,7 +103,7 @@ PRECONDITIONERS = {
 
 
 def find_preconditioner(name: str | None) -> None:
-    """InputError unless it is the name of a preconditioner, None or 'none'."""
+    """Raise InputError unless it is the name of a preconditioner, None or 'none'."""
     if name not in (None, "none", *PRECONDITIONERS):
         raise InputError(
             f"unknown preconditioner {name!r}; choose from {', '.join(PRECONDITIONERS)}."

@@ -50,7 +50,9 @@ Root = tuple[Act, Act]  # products with P and with G = P^-1
 
 
 def laplacian(problem: InterfaceProblem, held: np.ndarray) -> Root:
-    """Products with P and P^-1, mean diagonal one (Hutchinson 1989); InputError without cells."""
+    """Products with P and G = P^-1, scaled so that the mean of the diagonal of G is one (estimated
+    as by Hutchinson, 1989). InputError without cells.
+    """
     cells = problem.chart.cells
     if cells is None:
         raise InputError(

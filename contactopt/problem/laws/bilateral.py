@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.problem.cones import cylinder_derivative, disc, disc_of_height, split, unit
+from contactopt.problem.cones import cylinder_derivative, disc, split, unit
 from contactopt.problem.laws.law import Law, Projected
 
 
@@ -28,10 +28,8 @@ class Bilateral(Law):
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
         return cylinder_derivative(y, self.bound(r_n), -np.inf)
 
-    def project(self, y: np.ndarray) -> Projected:
-        """y_n itself, and y_t projected on the disc of radius mu |y_n|."""
-        n, t = split(y)
-        return disc_of_height(n, t, self.mu, np.sign(n))
+    def slope(self, r_n: np.ndarray) -> np.ndarray:
+        return np.asarray(self.mu * np.sign(r_n))
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
         n, t = split(y)

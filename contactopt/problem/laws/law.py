@@ -33,7 +33,8 @@ class Kinks(NamedTuple):
 class Law:
     """What all laws share.
 
-    A law of its own needs `bound` and `nearest_derivative`; the rest has defaults.
+    A law of its own needs `bound` and `nearest_derivative`, and `slope` where the bound depends on
+    the normal force; the rest has defaults.
     The fields of a law are its parameters: arrays (k,) of numbers that are not negative, or one
     number for all contacts. Methods ask a law for these properties, never for its name:
 
@@ -82,7 +83,7 @@ class Law:
 
     @property
     def lowest(self) -> np.ndarray:
-        """(k,) least normal force [force]: 0 where a contact may open, -inf where it cannot."""
+        """The least normal force (k,) [force]: 0 where a contact may open, -inf where it cannot."""
         return np.full(self.contacts, 0.0 if self.opens else -np.inf)
 
     @classmethod
@@ -99,12 +100,12 @@ class Law:
 
     @property
     def coefficient(self) -> np.ndarray:
-        """(k,) friction coefficients, of the largest direction: `mu`, or 0 without any."""
+        """The largest friction coefficients (k,) in any direction: `mu`, or 0 without any."""
         return getattr(self, "mu", np.zeros(self.contacts))
 
     @property
     def rough(self) -> np.ndarray:
-        """(k,) mask of the contacts that can carry a tangential force."""
+        """The mask (k,) of the contacts that can carry a tangential force."""
         return self.coefficient > 0
 
     @property
@@ -119,11 +120,15 @@ class Law:
         return None
 
     def bound(self, r_n: np.ndarray) -> np.ndarray:
-        """(k,) the largest |r_t| [force] in any direction under normal forces r_n (k,)."""
+        """The largest |r_t| (k,) [force] in any direction under normal forces r_n (k,)."""
         raise NotImplementedError
 
+    def slope(self, r_n: np.ndarray) -> np.ndarray:
+        """(k,) the derivative of `bound` by the normal force."""
+        return np.zeros(len(r_n))
+
     def bound_along(self, r: np.ndarray) -> np.ndarray:
-        """(k,) the largest |r_t| [force] in the direction of r_t, for forces r (k, dim)."""
+        """The largest |r_t| (k,) [force] in the direction of r_t, for forces r (k, dim)."""
         return self.bound(r[:, 0])
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
@@ -138,11 +143,14 @@ class Law:
         return self.nearest_derivative(y, r_n)[0]
 
     def project(self, y: np.ndarray) -> Projected:
-        """P(y) (k, dim) of r = P(r - rho u), and generalised derivatives (k, dim, dim)."""
-        return self.nearest_derivative(y, y[:, 0])
+        """The map P(y) (k, dim) of r = P(r - rho u), and its derivatives (k, dim, dim)."""
+        P, D = self.nearest_derivative(y, y[:, 0])
+        slips = lengths(y[:, 1:]) > self.bound(y[:, 0])
+        D[:, 1:, 0] += (slips * self.slope(y[:, 0]))[:, None] * unit(y[:, 1:])
+        return P, D
 
     def mapped(self, y: np.ndarray) -> np.ndarray:
-        """P(y) (k, dim) of `project` alone."""
+        """The map P(y) (k, dim) of `project` without its derivatives."""
         return self.project(y)[0]
 
     def project_by_parameter(self, y: np.ndarray) -> np.ndarray:
@@ -167,26 +175,26 @@ class Law:
         return out
 
     def idle(self, y: np.ndarray) -> np.ndarray:
-        """(k,) mask of the points at which `project` and its derivative are sure to be zero."""
+        """The mask (k,) of the points at which `project` and its derivative are sure to be zero."""
         return np.zeros(len(y), dtype=bool)
 
     def opening(self, u_t: np.ndarray) -> np.ndarray:
-        """g (k,) [length], what slip u_t (k, dim - 1) adds to the gap."""
+        """The length g (k,) [length] that slip u_t (k, dim - 1) adds to the gap."""
         return np.zeros(len(u_t))
 
     def natural_map(self, r: np.ndarray, u: np.ndarray, rho: float) -> np.ndarray:
-        """proj_K(r - rho (u + g n)) (k, dim), equal to r exactly where r and u obey the law."""
+        """proj_K(r - rho (u + g n)) (k, dim), which equals r exactly where r and u obey the law."""
         shifted = r - rho * u
         shifted[:, 0] -= rho * self.opening(u[:, 1:])
         return self.nearest(shifted, r[:, 0])
 
     def pressed(self, r: np.ndarray) -> np.ndarray:
-        """(k,) mask of the contacts that carry a normal force beyond rounding, or cannot open."""
+        """The mask (k,) of contacts that carry a normal force beyond rounding, or cannot open."""
         size = np.abs(r[:, 0])
         return np.asarray((size > PRESSED * size.max(initial=0.0)) | (self.lowest < 0))
 
     def sticking(self, r: np.ndarray) -> np.ndarray:
-        """(k,) mask of the pressed contacts with a tangential force below its bound."""
+        """The mask (k,) of the pressed contacts with a tangential force below its bound."""
         return self.pressed(r) & (lengths(r[:, 1:]) < (1 - BELOW) * self.bound_along(r))
 
     def scaled(self, force: float) -> Self:
@@ -202,15 +210,15 @@ class Law:
         return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
 
     def select(self, contacts: np.ndarray) -> Law:
-        """The law of some contacts, given by a mask (k,) or their numbers, which may repeat."""
+        """The law of some contacts, which a mask (k,) or numbers that may repeat choose."""
         return self._mapped(lambda parameter: parameter[contacts])
 
     def lumped(self, first: np.ndarray, count: int) -> Law:
-        """The law of groups of `count` contacts that act as one, each by its `first`."""
+        """The law of groups of `count` contacts that act as one, each with that of its `first`."""
         return self.select(first)
 
     def spread(self, k: int) -> Self:
-        """The law of k contacts, all numbers (k,); InputError for an array of another length."""
+        """The law with a number for each of k contacts; InputError for arrays of another length."""
         shapes = {name: np.shape(getattr(self, name)) for name in self.parameters}
         for name, shape in shapes.items():
             if shape not in ((), (k,)):
@@ -221,7 +229,7 @@ class Law:
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Law:
-        """The law of k contacts from a scene's values, one or (k,); InputError on another shape."""
+        """The law of k contacts from a scene's values, one or (k,); InputError for other shapes."""
         if values.shape not in ((), place.areas.shape):
             raise InputError(
                 "the friction of a scene must be one number or one per contact, shape"

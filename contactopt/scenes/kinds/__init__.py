@@ -1,13 +1,19 @@
 """Kinds of analysis: one file each, one row here."""
 
-from contactopt.scenes.kinds.axisymmetric import Axisymmetric
-from contactopt.scenes.kinds.kind import Kind
-from contactopt.scenes.kinds.plane_strain import PlaneStrain
-from contactopt.scenes.kinds.plane_stress import PlaneStress
-from contactopt.scenes.kinds.solid import Solid
+from importlib import import_module
 
+from contactopt.scenes.kinds.kind import Constants, Kind
+
+# name -> (module, class)
+_KINDS = {
+    "plane-strain": ("plane_strain", "PlaneStrain"),
+    "plane-stress": ("plane_stress", "PlaneStress"),
+    "axisymmetric": ("axisymmetric", "Axisymmetric"),
+    "solid": ("solid", "Solid"),
+}
 KINDS: dict[str, Kind] = {
-    kind.name: kind for kind in (PlaneStrain(), PlaneStress(), Axisymmetric(), Solid())
+    name: getattr(import_module(f"{__name__}.{module}"), kind)()
+    for name, (module, kind) in _KINDS.items()
 }
 
-__all__ = ["KINDS", "Kind"]
+__all__ = ["KINDS", "Constants", "Kind"]

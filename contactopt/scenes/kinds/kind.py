@@ -1,8 +1,21 @@
 """What a kind of analysis is: what its bodies stand for, and what follows from that."""
 
-from typing import ClassVar
+from types import SimpleNamespace
+from typing import Any, ClassVar, NamedTuple
 
-from contactopt.material import Material, lame, lame_by_poisson
+from contactopt.material import Material, lame
+
+STEP = 1e-30  # into the complex plane, whose square is rounding: no difference is taken
+
+
+class Constants(NamedTuple):
+    """stress = lam tr(strain) 1 + 2 shear strain in the mesh's axes; across a section, in the third
+    axis, it is across tr(strain) + 2 shear strain, where only bodies of revolution have a strain.
+    """
+
+    lam: float
+    shear: float
+    across: float
 
 
 class Kind:
@@ -12,7 +25,7 @@ class Kind:
     components  of a displacement, in the order of the mesh coordinates
     stresses    components of a stress, in the order of files
     revolved    whether the bodies are those that the section makes around an axis, its second one
-    stretches   whether a body is free to strain across the plane, where it then has no stress
+    stretches   whether a body strains across the plane
     deck        names of elements in a deck of CalculiX begin so
     """
 
@@ -32,13 +45,15 @@ class Kind:
         """The factor of integrals over the mesh, without r: thickness, 2 pi or 1."""
         return thickness
 
-    def constants(self, material: Material) -> tuple[float, float]:
-        """lambda and G of stress = lambda tr(strain) 1 + 2 G strain in the mesh's axes [stress]."""
-        return lame(material)
+    def constants(self, material: Material) -> Constants:
+        """Those of Hooke's law in the mesh's axes [stress]."""
+        lam, shear = lame(material)
+        return Constants(lam, shear, lam)
 
-    def constants_by_poisson(self, material: Material) -> tuple[float, float]:
-        """The derivatives of `constants` by Poisson's ratio [stress]."""
-        return lame_by_poisson(material)
+    def constants_by_poisson(self, material: Material) -> Constants:
+        """The derivatives of `constants`, which is analytic, by Poisson's ratio [stress]."""
+        moved: Any = SimpleNamespace(E=material.E, nu=material.nu + STEP * 1j)
+        return Constants(*(complex(value).imag / STEP for value in self.constants(moved)))
 
     def half_width(self, area: float, thickness: float) -> float:
         """The half-width [length] of a zone of this area: a strip, a disc or a square."""

@@ -8,8 +8,8 @@ sigma_zz = lambda (e_xx + e_yy + e_zz) + 2 G e_zz = 0 gives e_zz, and with it
 Source: Timoshenko, Goodier (1970), Theory of elasticity, chapter 2.
 """
 
-from contactopt.material import Material, lame, lame_by_poisson
-from contactopt.scenes.kinds.kind import Kind
+from contactopt.material import Material, lame
+from contactopt.scenes.kinds.kind import Constants, Kind
 
 
 class PlaneStress(Kind):
@@ -19,9 +19,5 @@ class PlaneStress(Kind):
     stretches = True
     deck = "CPS"
 
-    def constants(self, material: Material) -> tuple[float, float]:
-        return material.E * material.nu / (1 - material.nu**2), lame(material)[1]
-
-    def constants_by_poisson(self, material: Material) -> tuple[float, float]:
-        E, square = material.E, material.nu**2
-        return E * (1 + square) / (1 - square) ** 2, lame_by_poisson(material)[1]
+    def constants(self, material: Material) -> Constants:
+        return Constants(material.E * material.nu / (1 - material.nu**2), lame(material)[1], 0.0)

@@ -122,7 +122,8 @@ class BoltEnd(Load):
 
     def resultant(self, components: tuple[str, ...], n: np.ndarray) -> np.ndarray:
         if self.direction is None:
-            return -self.pull * n
+            n = np.where(np.abs(n) > ROUNDED, n, 0.0)  # rounding may move a face that nothing holds
+            return np.asarray(-self.pull * n)
         way = np.asarray(self.direction, dtype=float)
         way = way / np.linalg.norm(way)
         if abs(way @ n) < SLANTED:
@@ -136,9 +137,8 @@ class BoltEnd(Load):
         force = self.resultant(face.components, face.normal)
         if self.tilting:
             return Traction(self.boundary, tuple(force / face.area))
-        rounding = ROUNDED * self.pull
         own = {c: float(f) for c, f in zip(face.components, force)}
-        held = [c for c in own if c in face.held and abs(own[c]) > rounding]
+        held = [c for c in own if c in face.held and abs(own[c]) > ROUNDED * self.pull]
         if held:
             raise InputError(
                 f"bolt '{self.name}' keeps the face {self.boundary!r} parallel and moves it along"

@@ -119,10 +119,11 @@ def report(rows: list[Row], seeds: list[Row]) -> str:
         }
         for name, all_of in ratios.items()
     ]
+    lines = {row["method"] for row in stored("atlas", "frontiers")}
     parts = {
         "failures": markdown(table),
         "thresholds": markdown(errors),
-        "sections": "\n\n".join(section(row, WORDS[row["method"]]) for row in rows),
+        "sections": "\n\n".join(section(row, WORDS[row["method"]], lines) for row in rows),
         "environment": environment(),
         "own": sum(row.get("contacts", 9) <= 3 for row in rows if " " not in row["method"]),
         "hits": hits(seeds, False),
@@ -142,8 +143,8 @@ def hits(seeds: list[Row], peers: bool) -> str:
     return f"{int(sum(seen))} of {len(seen)}"
 
 
-def section(row: Row, words: dict[str, Any]) -> str:
-    """The paragraph of a method."""
+def section(row: Row, words: dict[str, Any], drawn: set[str]) -> str:
+    """The paragraph of a method, with its figure: a threshold for those in `drawn`, else shares."""
     name = row["method"]
     lines = [f"### {name}", f"{words['iterates']} Threshold: {words['threshold']}."]
     if "case" in row:
@@ -158,7 +159,10 @@ def section(row: Row, words: dict[str, Any]) -> str:
     else:
         lines.append(f"None of {total(row, 'tried'):,} searched problems makes it fail.")
     if " " not in name:
-        lines.append(f"![{name}]({name}.png)")
+        told = f"Share of the problems on which `{name}` fails. Grey: no failure was found."
+        if name in drawn:
+            told = f"Where `{name}` begins to fail: predicted (line) and observed (points)."
+        lines.append(f"![{name}]({name}.png)\n\n*{told}*")
     return "\n\n".join(lines)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import LogLocator, NullLocator
 
-from contactopt.figures.style import BLUE, LETTERS, ORANGE, add_colours, paper_axes
+from contactopt.figures.style import BLUE, LETTERS, ORANGE, paper_axes
 from experiments.questions.atlas.frontiers import MULTIPLIERS
 from experiments.questions.atlas.problems import FAILED, KNOBS
 from experiments.questions.atlas.radii import ITERATIONS_OF
@@ -72,7 +72,7 @@ def shares(tried: dict[str, int], failed: dict[str, int]) -> Any:
     ax.set_xlabel("share of the problems on which it fails [%]")
     for place, value, kind in zip(places, np.where(share > 0, share, possible), kinds):
         text = f" {failed.get(kind, 0)} of {tried[kind]}"
-        ax.text(value, place, text, va="center", fontsize=LETTERS - 1)
+        ax.text(value, place, text, va="center", fontsize=LETTERS)
     return figure
 
 
@@ -106,13 +106,12 @@ def overview(rows: list[Row]) -> Any:
             if tried := row["tried"].get(kind):
                 share[i, j] = row["failed"].get(kind, 0) / tried
     figure, (ax,) = paper_axes(height=0.14 * len(names) + 0.9)
-    drawn = ax.imshow(100 * share, cmap="OrRd", vmin=0, vmax=50, aspect="auto")
+    ax.imshow(100 * share, cmap="OrRd", vmin=0, vmax=50, aspect="auto")
     ax.set_xticks(range(len(kinds)), [KINDS[kind] for kind in kinds], rotation=60, ha="right")
     ax.set_yticks(range(len(names)), names)
     for i, j in zip(*np.nonzero(np.isfinite(share))):
-        if share[i, j] > 0:
-            look = {"ha": "center", "va": "center", "fontsize": LETTERS - 2}
-            colour = "white" if share[i, j] > 0.35 else "black"
-            ax.text(j, i, f"{100 * share[i, j]:.0f}", color=colour, **look)
-    add_colours(drawn, ax, "share of problems that fail [%]")
+        look = {"ha": "center", "va": "center", "fontsize": LETTERS}
+        colour = "white" if share[i, j] > 0.35 else "black" if share[i, j] > 0 else "#999999"
+        ax.text(j, i, f"{100 * share[i, j]:.0f}", color=colour, **look)
+    ax.set_title("share of problems that fail [%]", fontsize=LETTERS)
     return figure

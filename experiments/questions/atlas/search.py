@@ -180,7 +180,7 @@ CURES: dict[str, Cure] = {
     "no coupling of normal and tangential directions": lambda c: c.loaded(Q=uncoupled(c)),
     "no coupling between contacts": lambda c: c.loaded(Q=blocks(c)),
     "the symmetric part of Q": lambda c: c.loaded(Q=(c.Q + c.Q.T) / 2),
-    "Q with a better condition": lambda c: c.loaded(Q=stiffer(c)),
+    "a better-conditioned Q": lambda c: c.loaded(Q=stiffer(c)),
     "contacts of equal compliance": lambda c: c.loaded(Q=alike(c)),
     "the plate held": held,
     "no start": lambda c: replace(c, start=None),

@@ -134,8 +134,8 @@ second order and give five digits or six, and so do peaks in the middle of a smo
 peak under the punch x^4 is off the middle, and between two nodes.
 
 **How a width is read.** Fit a parabola to p^2 as a function of x^2: its zero is exact for the
-pressure of Hertz. Under the punch x^4 this zero stays more than 1 % too far out on any mesh, on
-both ways. Therefore the product of a root and a polynomial is fitted to the pressure, over the
+pressure of Hertz. Under the punch x^4 this zero stays more than 1 % too far out on the meshes of
+both sequences. Therefore the product of a root and a polynomial is fitted to the pressure, over the
 share of the half-width with the smallest standard error. This fit has no such limit. Where linear
 elements grow or shrink, the force of a node over its area is the traction at a place beside the
 node, and is read there. `tests/test_edges.py` has the pressures.

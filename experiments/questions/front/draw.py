@@ -33,8 +33,9 @@ ASKED = {  # scene -> the quantity that is asked of it
 SHORT = {"half-space": "½", "small body": "B", "associated": "A", "mu = .3": "F"}
 SHORT |= {"solid": "S", "linear": "L", "quadratic": "Q", "uniform": "U", "Gauss": "G"}
 KEY = (
-    "½ half-space   L, Q linear, quadratic   S solid   G Gauss-Seidel\n"
-    "B small body   A associated   F friction added   number: elements or points"
+    "½ half-space   L, Q linear, quadratic   S solid\n"
+    "B small body   A associated   F friction added\n"
+    "G Gauss-Seidel   number: elements or points"
 )
 KINDS = ("model", "mesh", "reading", "tolerance")
 TOLD = ("half-space", "linear", "quadratic", "small body", "mu = .3", "uniform")
@@ -83,29 +84,29 @@ def letter(model: str) -> str:
 
 def draw_front(made: list[Row]) -> Any:
     """Seconds of the cheapest way to each accuracy, as a table of colours."""
-    figure, (left, right) = paper_axes(columns=2, height=2.3)
+    figure, (top, bottom) = paper_axes(rows=2, height=1.75)
     scenes = [scene for scene in ASKED if any(row["scene"] == scene for row in made)]
-    for ax, name in ((left, "all models"), (right, "meshes")):
+    for ax, name in ((top, "all models"), (bottom, "meshes alone")):
         grid = np.full((len(scenes), len(ACCURACIES)), np.nan)
         for row in made:
-            if row["with"] != name:
+            if row["with"] not in name:
                 continue
             at = scenes.index(row["scene"]), ACCURACIES.index(row["accuracy"])
             grid[at] = np.log10(row["cpu"])
             text = f"{letter(row['model'])}{row['mesh']}"
             dark = "w" if grid[at] > -0.9 else "k"
-            ax.text(*at[::-1], text, ha="center", va="center", fontsize=LETTERS - 1, color=dark)
+            ax.text(*at[::-1], text, ha="center", va="center", fontsize=LETTERS, color=dark)
         drawn = ax.imshow(grid, cmap="viridis_r", vmin=-2, vmax=0.5, aspect="auto")
         ax.set_xticks(range(len(ACCURACIES)), ["10", "3", "1", ".3", ".1"])
-        ax.set_yticks(range(len(scenes)), scenes if ax is left else [""] * len(scenes))
-        ax.set_xlabel("accuracy [%]")
+        ax.set_yticks(range(len(scenes)), scenes)
         ax.set_title(name, fontsize=LETTERS)
         ax.spines[:].set_visible(False)
-    bar = figure.colorbar(drawn, ax=[left, right], location="bottom", shrink=0.7, pad=0.02)
+    bottom.set_xlabel("accuracy [%]")
+    bar = figure.colorbar(drawn, ax=[top, bottom], location="bottom", shrink=0.7, pad=0.02)
     bar.set_ticks([-2, -1, 0], labels=["0.01", "0.1", "1"])
     bar.ax.tick_params(labelsize=LETTERS)
     bar.set_label("CPU time [s]", fontsize=LETTERS)
-    figure.suptitle(KEY, fontsize=LETTERS - 1)
+    figure.suptitle(KEY, fontsize=LETTERS)
     return figure
 
 
@@ -151,13 +152,15 @@ def draw_regions(rows: list[Row]) -> Any:
         )
         parts = np.array([[abs(r[f"{kind} error"]) for kind in KINDS] for r in own])
         shape = len(meshes), len(tolerances)
-        ax.imshow(parts.argmax(axis=1).reshape(shape).T, cmap=colours, vmin=-0.5, vmax=3.5,
-                  aspect="auto")  # fmt: skip
+        largest = parts.argmax(axis=1).reshape(shape)
+        ax.imshow(largest.T, cmap=colours, vmin=-0.5, vmax=3.5, aspect="auto")
         total = np.array([abs(sum(r[f"{kind} error"] for kind in KINDS)) for r in own])
         for (i, j), value in np.ndenumerate(total.reshape(shape)):
             if i % 2 == 0:
                 text = f"{100 * value:.2g}" if value < 0.1 else f"{100 * value:.0f}"
-                ax.text(i, j, text, ha="center", va="center", fontsize=LETTERS - 2)
+                text = text.removeprefix("0")
+                dark = "w" if largest[i, j] == KINDS.index("model") else "k"
+                ax.text(i, j, text, ha="center", va="center", fontsize=LETTERS, color=dark)
         words = {"fitted": "fitted", "nodes": "at nodes"}[reading]
         ax.set_title(f"{quantity}, {words}", fontsize=LETTERS)
         ax.set_xticks(range(0, len(meshes), 2), [str(m) for m in meshes[::2]])
@@ -167,7 +170,7 @@ def draw_regions(rows: list[Row]) -> Any:
     for ax in axes[::2]:
         ax.set_ylabel("tolerance")
     signs = [Patch(color=colours(number), label=kind) for number, kind in enumerate(KINDS)]
-    title = "the largest error, and their sum in percent"
+    title = "colour: the largest error; number: all together [%]"
     figure.legend(
         handles=signs,
         ncols=4,
@@ -192,7 +195,7 @@ def draw_rule(rows: list[Row]) -> Any:
             ax.annotate(
                 row["scene"].partition(",")[0],
                 (x, y),
-                fontsize=LETTERS - 1,
+                fontsize=LETTERS,
                 color=COLOURS[1],
                 xytext=(-4 if left_of else 4, 0),
                 textcoords="offset points",

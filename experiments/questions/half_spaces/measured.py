@@ -51,7 +51,7 @@ def solved(scene: Scene) -> Row:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     making, reduction = cpu(lambda: reduce_bodies(scene))
     steps = Steps(reduction.problem.Q.kernel.grid)
-    log = logging.getLogger("contactopt.methods.nested")
+    log = logging.getLogger("contactopt.methods.kernels.level_steps")
     log.addHandler(steps)
     log.setLevel(logging.INFO)
     solving, solution = cpu(lambda: solve(reduction.problem))
