@@ -8,6 +8,7 @@ from contactopt.material import Material
 from contactopt.problem.chart import Chart
 from contactopt.readings.edges import contact_area, contact_edge, contact_zone, stick_edge
 from contactopt.scenes import make_scene
+from contactopt.scenes.scene_files import read_scene_file
 from contactopt.solving.solve_scene import solve_scene
 
 PART = Part("body", None, Material(1.0, 0.3))
@@ -268,3 +269,38 @@ def test_the_edge_of_a_flat_punch_is_that_of_the_surface():
     falling = r.copy()
     falling[np.argsort(problem.coordinates[0])[-1]] *= 1e-3
     assert contact_zone(scene, problem, falling)[1] > 0.1
+
+
+SPREAD = """kind = "solid"
+[bodies.block]
+block = { x = [-2, 2], y = [-2, 2], z = [0, 2], elements = [4, 4, 2] }
+material = { E = 210e3, nu = 0.3 }
+contact = "z-"
+body_force = { z = -1e-3 }
+tractions = [
+    { boundary = "x+", x = 0.004 }, { boundary = "x-", x = -0.004 },
+    { boundary = "y+", y = 0.004 }, { boundary = "y-", y = -0.004 },
+]
+[bodies.ground]
+block = { x = [-2, 2], y = [-2, 2], z = [-2, 0], elements = [4, 4, 2] }
+material = { E = 210e3, nu = 0.3 }
+contact = "z+"
+supports = [{ boundary = "z-", x = 0, y = 0, z = 0 }]
+[[contacts]]
+upper = "block"
+lower = "ground"
+mu = 0.3
+"""
+
+
+def test_a_zone_of_one_contact_has_no_negative_width(tmp_path):
+    """Only the contact in the middle sticks; its edge, extrapolated from it, lies beyond it."""
+    (tmp_path / "spread.toml").write_text(SPREAD)
+    solved = solve_scene(read_scene_file(tmp_path / "spread.toml").states[0])
+    width, uncertainty = stick_edge(
+        solved.reduction.scene,
+        solved.reduction.problem,
+        solved.solution.reactions,
+        solved.reduction.moved(solved.solution)[:, 1:],
+    )
+    assert width == pytest.approx(np.pi**-0.5) and uncertainty >= width / 2

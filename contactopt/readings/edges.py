@@ -200,9 +200,9 @@ def _half_width(
     if inside.all() or not inside.any():
         return coarse
     found = [patch.measure(read) for patch in patches_of(problem, inside, weights)]
-    if not found or any(patch is None for patch in found):
+    ends = [patch for patch in found if patch is not None and patch.last > patch.first]
+    if not found or len(ends) < len(found):  # not read, or read beyond the middle
         return coarse
-    ends = [patch for patch in found if patch is not None]
     if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
         return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
     uncertainty = sum(patch.copies * max(patch.uncertainty, least * patch.step) for patch in ends)
