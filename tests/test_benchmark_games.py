@@ -174,7 +174,7 @@ def test_the_key_of_a_run_changes_with_the_source_of_its_plug_in(tmp_path, monke
     written(tmp_path, source.replace("return 0", "return 1"), "mine.py")
     edited = keys()
     assert edited["auto"] == first["auto"] and not edited["mine"] & first["mine"]
-    monkeypatch.setattr("contactopt.benchmark.runs.version", lambda name: "99")
+    monkeypatch.setattr("contactopt.benchmark.runs._own_version", lambda: "99")
     assert not keys()["auto"] & first["auto"]
 
 
