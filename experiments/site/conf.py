@@ -17,12 +17,9 @@ import docstrings
 import generate
 import lectures
 import museum
-from jupyter_client.connect import ConnectionFileMixin
 
 import contactopt
 
-if os.name == "posix":  # kernels that talk over TCP warn of eavesdroppers, one by one
-    ConnectionFileMixin.transport.default_value = "ipc"
 # the chapters, which run in processes of their own, import the exercises of the course
 os.environ["PYTHONPATH"] = os.pathsep.join([sys.path[1], os.environ.get("PYTHONPATH", "")])
 project, author = "contactopt", "The contactopt developers"
