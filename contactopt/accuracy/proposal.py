@@ -157,8 +157,10 @@ def _volume(nu: float) -> float:
 
 
 def stuck_share(mu: float, nu: float, plane: bool) -> float:
-    """The share c of the half-width of a rigid flat punch that sticks, to 20 % that of Spence.
+    """The share c of the half-width of a rigid flat punch that sticks, within 20 %.
 
+    The exact share (contactopt.analytic.spence.stick_ratio) would take up to a second, longer than
+    most of the solutions that are proposed.
     K(sqrt(1 - c^2)) / K(c) is proportional to beta / mu, with the complete elliptic integral K and
     Dundurs' beta = (1 - 2 nu) / (2 - 2 nu).
     """

@@ -93,7 +93,8 @@ def pressure_reading(reduction: Reduction, solution: Solution) -> Reading:
         peak = _fitted_top(problem, pressure, usable, top)
         uncertainty = peak.uncertainty + noise / float(problem.areas[top])
         near = around(problem, top)
-        drop = 1.0 - float(seen[near[usable[near]]].min() / seen[top])
+        others = near[usable[near] & (near != top)]  # none around a contact that is alone
+        drop = 1.0 - float(seen[others].min() / seen[top]) if len(others) else 1.0
         found.append(replace(peak, uncertainty=uncertainty, drop=drop))
     found.sort(key=lambda peak: -peak.value)
     return Reading(found[0].value, found[0].uncertainty, tuple(found))

@@ -40,11 +40,12 @@ def leaders(table) -> str:  # type: ignore[no-untyped-def]
     if "auto" not in leaders.index or not leaders.loc["auto", "solved"] > 0:
         return "`auto` reached the certificate 1e-6 on no problem that all solvers take."
     auto = leaders.loc["auto"]
-    least = f"{auto['over the least']:.2g}"
+    over = auto["over the least"]
+    least = f"{over:.2g} times the smallest" if over > 1 else "the smallest of all"
     return (
         f"`auto` reaches the certificate 1e-6 on {int(auto['solved'])} of the {int(auto['of'])}"
         f" problems that all {len(leaders)} solvers take and some solver solves."
-    ) + ("" if unranked(table) else f" Its mean CPU time over them is {least} times the smallest.")
+    ) + ("" if unranked(table) else f" Its mean CPU time over them is {least}.")
 
 
 def repeats(table) -> str:  # type: ignore[no-untyped-def]
