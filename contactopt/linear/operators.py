@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg.lapack import dlange, dpocon, dpotrf
 from scipy.sparse.linalg import LinearOperator
 
 from contactopt.errors import InputError
@@ -24,6 +25,7 @@ log = logging.getLogger(__name__)
 FORMS = ("auto", "explicit", "implicit")  # of Q
 NOISE = 1e-13  # relative size of what rounding leaves of a zero
 FINEST = 1e-11  # accuracy of products that is not asked for more
+DOUBTFUL = 1e-8  # inverse of a condition above which rounding is felt
 POWER_STEPS, MARGIN = 10, 1.1  # towards a largest eigenvalue, and the factor on what they find
 COLUMNS = 64  # of an inverse or of Q that are made at a time, which bounds the memory beside it
 # bytes of an array Q from which on its size is logged: a quarter of a gigabyte
@@ -165,6 +167,14 @@ def form(Q: Interface) -> Form:
     if isinstance(Q, np.ndarray):  # most often
         return "array"
     return Q.form if isinstance(Q, InterfaceOperator) else "sparse"
+
+
+def ill_conditioned(Q: np.ndarray) -> bool:
+    """Whether an array Q (n, n), if it is symmetric, is not definite or has a condition above
+    1 / DOUBTFUL.
+    """
+    factor, failed = dpotrf(Q.T, clean=False)
+    return bool(failed or dpocon(factor, dlange("1", Q.T))[0] < DOUBTFUL)
 
 
 def has_entries(Q: Interface) -> bool:

@@ -8,10 +8,9 @@ proximal loop.
 1. Unless Q is sparse and singular (rigid bodies): Newton's method from the bonded solution (or no
    force at all) while its residual falls. Elastic bodies end here. Where its sortings go round in a
    circle near a solution, a few proximal steps break out of it.
-2. Where Q is sparse and singular: PLAIN_SWEEPS more sweeps that are not accelerated, since the
-   acceleration may go round in a circle, and the sweeps of stage 0 from no force again, each of
-   them accelerated. Then the proximal loop, as long as its subproblems are easy and each of them
-   halves the residual.
+2. Where Q is sparse and singular: the sweeps of stage 0 from no force again, each of them
+   accelerated, since packings on which one of the two goes round in a circle seldom stop the other.
+   Then the proximal loop, as long as its subproblems are easy and each of them halves the residual.
 3. The interior-point method (contactopt.methods.kernels.interior), which no cycle and no rank
    deficiency of Q disturbs, and a few steps of the proximal loop for the last digits. Where these
    fail, it ends if a proof is found that there is no solution (contactopt.problem.feasibility).
@@ -134,9 +133,7 @@ class _Swept:
         self.r = np.array(first, order="C")
 
     def points(self, most: int, between: int, budget: float) -> Iterator[Iterate]:
-        """Points that `most` sweeps reach within a number of multiplications: rough, then exact.
-        Where `between` is 0, they are not accelerated.
-        """
+        """Points that `most` sweeps reach within a number of multiplications: rough, then exact."""
         problem = self.problem
         explicit = has_entries(problem.Q)
         size = problem.Q.nnz if form(problem.Q) == "sparse" else problem.q.size**2
@@ -146,7 +143,7 @@ class _Swept:
             return
         if not (NSGS().solves(problem.law) and Sweeps.can(problem)):
             return
-        sweeps = Sweeps(problem, constants.SWEEPS_KEPT if between else 0, between)
+        sweeps = Sweeps(problem, constants.SWEEPS_KEPT, between)
         often = int(constants.MOMENT // cost) + 1
         done = self.reached(constants.NEARLY_SWEPT, sweeps, left, often)
         if not done:
@@ -198,12 +195,9 @@ class _Robust:
         self, start: Iterate | None, reached: Iterate
     ) -> Generator[Iterate | Known, None, None]:
         problem = self.problem
-        plain = self.swept.points(constants.PLAIN_SWEEPS, 0, np.inf)
         if self.loose and start is not None:
             reached = yield from self.proximal(start, constants.POLISH, constants.LEAST_ALPHA)
-            yield from plain
         elif self.loose:
-            yield from plain
             self.swept.r[:] = 0.0
             again = constants.FIRST_SWEEPS, constants.MORE_BETWEEN
             yield from self.swept.points(*again, constants.SWEEPING)

@@ -7,9 +7,9 @@ from rounding, from the literature or from a proof stand beside the code that us
 """
 
 # The default method (contactopt.methods.auto): when one stage gives way to the next.
-# Sweeps at first, where Newton's method has failed, and those of sparse problems that are not
-# accelerated; multiplications that they may cost at first (1e6 take about a millisecond).
-FIRST_SWEEPS, MORE_SWEEPS, PLAIN_SWEEPS, SWEEPING = 500, 1000, 2000, 1e9
+# Sweeps at first, and where Newton's method has failed; multiplications that they may cost at
+# first (1e6 take about a millisecond).
+FIRST_SWEEPS, MORE_SWEEPS, SWEEPING = 500, 1000, 1e9
 LOCAL = 100.0  # multiplications that a local problem and the acceleration are worth
 FEWEST_SWEEPS = 60  # for which there must be room
 QUICK = 2e5  # multiplications of a sweep up to which the first sweeps are one call

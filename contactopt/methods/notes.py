@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 import numpy as np
-import scipy.linalg as la
 
 from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem, Solution
@@ -18,8 +17,7 @@ from contactopt.problem.certificate import amplification
 # a remark is due if a small problem has so large a condition, and its forces so large an error
 FEW, WEDGED, MUCH = 50, 1e4, 1e-3
 LOOSE = 1e12  # condition above which rounding decides
-EXACT = 1e-11  # certificate that leaves no doubt below a condition of 1e8,
-DOUBTFUL = 1e-8  # whose inverse this is
+EXACT = 1e-11  # certificate that leaves no doubt unless Q is nearly singular
 _notes: ContextVar[list[str] | None] = ContextVar("notes of the solve that runs", default=None)
 
 
@@ -42,21 +40,6 @@ def collected() -> Iterator[list[str]]:
         _notes.reset(token)
 
 
-def _nearly_singular(Q: np.ndarray) -> bool:
-    """Whether Q (n, n) has a condition at which EXACT leaves doubt, as it is and with a diagonal of
-    ones. Most have neither, and the first costs less.
-    """
-    if not _uncertain(Q):
-        return False
-    size = np.sqrt(np.abs(Q.diagonal()))
-    return not size.all() or _uncertain(Q / np.outer(size, size))
-
-
-def _uncertain(Q: np.ndarray) -> bool:
-    factor, singular = la.lapack.dpotrf(Q.T, clean=False)
-    return bool(singular or la.lapack.dpocon(factor, la.lapack.dlange("1", Q.T))[0] < DOUBTFUL)
-
-
 def dubious(problem: InterfaceProblem, solution: Solution) -> bool:
     """Whether the certificate of few contacts leaves a doubt that is worth its cost."""
     if not solution.solved or problem.contacts > FEW or form(problem.Q) != "array":
@@ -64,7 +47,7 @@ def dubious(problem: InterfaceProblem, solution: Solution) -> bool:
     if solution.residual > EXACT:
         return True
     # where contacts share a place, forces that are hardly felt have been exchanged
-    return _nearly_singular(np.asarray(problem.Q)) and not problem.shared_places
+    return problem.nearly_singular and not problem.shared_places
 
 
 def remark(problem: InterfaceProblem, solution: Solution) -> None:

@@ -35,6 +35,7 @@ from contactopt.linear.operators import (
     diagonal,
     form,
     has_entries,
+    ill_conditioned,
     row_sizes,
     sparse,
 )
@@ -243,6 +244,19 @@ class InterfaceProblem:
         own = own.ravel()
         order = np.argsort(own, kind="stable")
         return [one for one in np.split(order, np.cumsum(counts)[:-1]) if len(one) > 1]
+
+    @cached_property
+    def nearly_singular(self) -> bool:
+        """Whether an array Q is ill-conditioned as it is and, without the tangents along which
+        nothing moves, with a diagonal of ones. Most have neither, and the first costs less.
+        """
+        Q = np.asarray(self.Q)
+        if not ill_conditioned(Q):
+            return False
+        free = np.any(Q, axis=1)
+        free[:: self.dim] = True
+        size = np.sqrt(np.abs(Q.diagonal()[free]))
+        return not size.all() or ill_conditioned(Q[np.ix_(free, free)] / np.outer(size, size))
 
     @cached_property
     def reach(self) -> np.ndarray:

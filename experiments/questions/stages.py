@@ -110,7 +110,6 @@ STAGES: dict[str, tuple[Any, str, Callable[..., Any], Callable[..., bool]]] = {
         lambda *given, **more: "aim" in more,
     ),
     "more sweeps": (SWEPT, "points", nothing, sweeps(constants.MORE_SWEEPS)),
-    "plain sweeps": (SWEPT, "points", nothing, sweeps(constants.PLAIN_SWEEPS)),
     "interior path": (*INTERIOR, path_is(drawn=False)),
     "proof that there is no solution": (auto, "infeasibility", lambda problem: None, every),
     "tree over the states": (ROBUST, "searched", nothing, every),
