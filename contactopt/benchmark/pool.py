@@ -26,7 +26,7 @@ PLUGIN_WARM_UP = 3.0  # s the same for a plug-in, whose file was loaded before
 MARGIN, GRACE = 1.1, 0.5
 # s of CPU, and of the clock, of a run above which it is not repeated: on a busy machine short runs
 # take long by the clock
-LONG, LONG_WAIT = 0.2, 10.0
+LONG, LONG_WAIT = 1.0, 10.0
 _cold: set[str] = set()  # methods that did not survive their warm-up, in any worker of this process
 
 
