@@ -1,5 +1,7 @@
 """What a diagnosis states is true of random problems and of the iterations on them."""
 
+import pickle
+
 import numpy as np
 import pytest
 from test_diagnosis import changed, random_problem
@@ -229,3 +231,20 @@ def test_forces_that_hardly_move_anything_are_remarked_on_however_small_the_resi
     assert answer.solved and answer.residual <= 1e-11
     off = np.abs(answer.reactions - right).max()
     assert ("nearly" in "".join(answer.notes)) == (off > 1e-3)
+
+
+def test_whether_forces_are_nearly_not_unique_is_asked_by_who_reads_the_notes(monkeypatch):
+    """Reading costs a hundred times what the solve of so few contacts does, and is paid once."""
+    asked = []
+
+    def counted(*given):
+        asked.append(given)
+        return amplification(*given)
+
+    monkeypatch.setattr("contactopt.methods.notes.amplification", counted)
+    one = np.array([[1, 0.2], [0.2, 1]])
+    Q = np.block([[one, one], [one, one + 1e-12 * np.eye(2)]])  # as in the test above
+    answer = solve(InterfaceProblem(Q, -(Q @ [1, 0, 0.7, 0]).reshape(2, 2), 0.3), tol=1e-11)
+    assert answer.solved and not asked
+    assert "nearly" in answer.notes[0] and list(answer.notes) == [answer.notes[-1]]
+    assert len(asked) == 1 and pickle.loads(pickle.dumps(answer)).notes == answer.notes

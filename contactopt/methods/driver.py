@@ -25,7 +25,7 @@ from contactopt.methods import (
 from contactopt.methods.auto import Auto
 from contactopt.methods.method import Iterate, Known, Method, at_rest, dimensionless_start
 from contactopt.methods.newton import Newton
-from contactopt.methods.notes import collected, dubious, note, remark
+from contactopt.methods.notes import collected, note, with_notes
 from contactopt.methods.recorder import LEAST_PROOF, Limits, Recorder
 from contactopt.methods.small import solve_small
 from contactopt.problem import (
@@ -107,7 +107,7 @@ def solve(
     small = progress is None and change_tol is None and max_iterations >= 1
     small = small and time_limit >= LEAST_PROOF and chosen == USUAL
     solution, swept = solve_small(problem, tol, start) if small else (None, None)
-    if solution is not None and not (exchanged.may(problem) or dubious(problem, solution)):
+    if solution is not None and not exchanged.may(problem):
         return solution
     limits = Limits(tol, change_tol, max_iterations, time_limit, progress)
     with collected() as notes:
@@ -116,8 +116,7 @@ def solve(
         if solution.solved and exchanged.may(problem):
             finer = replace(limits, tol=EXACT, max_iterations=POLISHED, progress=None)
             solution = exchanged.least_friction(problem, _polished(problem, solution, finer), tol)
-        remark(problem, solution)
-    return replace(solution, notes=tuple(notes)) if notes else solution
+    return with_notes(problem, solution, notes)
 
 
 def _method_for(

@@ -1,12 +1,15 @@
 """What a solve did otherwise than asked or expected: a method calls `note`, which logs the
 sentence. The driver opens `collected` around each solve, whose Solution keeps them, also among
-threads.
+threads. Whether the forces of few contacts are nearly not unique costs more than to find them, and
+is asked when somebody reads the notes.
 """
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -40,30 +43,73 @@ def collected() -> Iterator[list[str]]:
         _notes.reset(token)
 
 
-def dubious(problem: InterfaceProblem, solution: Solution) -> bool:
-    """Whether the certificate of few contacts leaves a doubt that is worth its cost."""
-    if not solution.solved or problem.contacts > FEW or form(problem.Q) != "array":
-        return False
-    if solution.residual > EXACT:
-        return True
+class Notes(Sequence[str]):
+    """The notes of a solved problem as a tuple whose last entry, the remark on the forces of few
+    contacts, is looked for at the first reading.
+    """
+
+    def __init__(
+        self,
+        notes: Sequence[str],
+        problem: InterfaceProblem,
+        reactions: np.ndarray,
+        multipliers: np.ndarray,
+        residual: float,
+    ):
+        self._made, self._of = tuple(notes), (problem, reactions, multipliers, residual)
+
+    @cached_property
+    def _read(self) -> tuple[str, ...]:
+        said = remark(*self._of)
+        if said and said not in self._made:
+            logging.getLogger(__name__).info(said)
+            return *self._made, said
+        return self._made
+
+    def __getitem__(self, index):  # type: ignore[no-untyped-def]  # as that of a tuple
+        return self._read[index]
+
+    def __len__(self) -> int:
+        return len(self._read)
+
+    def __eq__(self, other: object) -> bool:
+        return self._read == (other._read if isinstance(other, Notes) else other)
+
+    def __hash__(self) -> int:
+        return hash(self._read)
+
+    def __repr__(self) -> str:
+        return repr(self._read)
+
+    def __reduce__(self) -> tuple[type, tuple[tuple[str, ...]]]:
+        return tuple, (self._read,)
+
+
+def with_notes(problem: InterfaceProblem, solution: Solution, notes: Sequence[str]) -> Solution:
+    """The solution with its notes."""
+    if solution.solved and problem.contacts <= FEW and form(problem.Q) == "array":
+        certified = solution.reactions, solution.multipliers, solution.residual
+        return replace(solution, notes=Notes(notes, problem, *certified))
+    return replace(solution, notes=tuple(notes)) if notes else solution
+
+
+def remark(
+    problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray, residual: float
+) -> str:
+    """Where certified forces may be far off; "" if they are not."""
     # where contacts share a place, forces that are hardly felt have been exchanged
-    return problem.nearly_singular and not problem.shared_places
-
-
-def remark(problem: InterfaceProblem, solution: Solution) -> None:
-    """Say where the forces of a small problem may be far off although they are certified."""
-    if not dubious(problem, at := solution):
-        return
-    condition = amplification(problem, at.reactions, at.multipliers)
-    error = condition * max(at.residual, np.finfo(float).eps)
+    if residual <= EXACT and (problem.shared_places or not problem.nearly_singular):
+        return ""
+    condition = amplification(problem, reactions, multipliers)
+    error = condition * max(residual, np.finfo(float).eps)
     if condition <= WEDGED or error <= MUCH:
-        return
+        return ""
     why = f"by {min(error, 1.0):.0%} of the typical force, because the solution is"
     why += " nearly not unique"
     if not condition < LOOSE:
         if problem.shared_places:
-            return
+            return ""
         why = "by any amount, because they are not unique, or nearly not"
     if problem.law.proportional and not problem.law.dilatant:
         why += ": see contactopt.diagnose"
-    note(logging.getLogger(__name__), f"The forces are certified, but they may be off {why}.")
+    return f"The forces are certified, but they may be off {why}."

@@ -13,7 +13,7 @@ from contactopt.methods import constants
 from contactopt.methods.auto import Auto
 from contactopt.methods.kernels import gauss_seidel
 from contactopt.methods.method import checked_start
-from contactopt.methods.notes import EXACT, FEW
+from contactopt.methods.notes import EXACT, FEW, Notes
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.laws.coulomb import Coulomb
 
@@ -30,8 +30,8 @@ def solve_small(
     k, dense = len(problem.q), not given[1][0].size
     if given[1][2].size + constants.LOCAL * k > constants.QUICK:
         return None, None
-    # more digits cost less than the condition of few contacts (contactopt.methods.notes)
-    enough = min(tol, EXACT) if dense and k <= FEW else tol
+    few = dense and k <= FEW  # more digits cost little, and leave less doubt
+    enough = min(tol, EXACT) if few else tol
     first = None if start is None else checked_start(start, problem)[0]
     residual, rubs, r = certified(given, constants.FIRST_SWEEPS, enough, first)
     if not residual <= tol:
@@ -39,8 +39,10 @@ def solve_small(
     seconds = time.perf_counter() - begin
     phases = {"solve": seconds, "certificate": 0.0, "checks": 0.0}
     row = {"residual": residual, "change": rubs, "seconds": seconds}
-    end = Status.SOLVED, residual, 1, NAME, (row,), phases, Status.SOLVED.sentence
-    return Solution(r, np.zeros(0), *end), None
+    none = np.zeros(0)
+    notes = Notes((), problem, r, none, residual) if few else ()
+    end = Status.SOLVED, residual, 1, NAME, (row,), phases, Status.SOLVED.sentence, notes
+    return Solution(r, none, *end), None
 
 
 def arrays_of(problem: InterfaceProblem) -> tuple[int, list[np.ndarray]] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -55,7 +56,8 @@ class Solution:
                  own names it: recovery, the coarse meshes before this one, the phases of a
                  reduction
     notes        sentences about what was unexpected in the solve: a fallback, a stage
-                 that failed
+                 that failed. Of few contacts, whether the forces are nearly not unique is looked
+                 for when they are read
     proof        status `infeasible`: what proves that there is no solution
     displacements  of the bodies that are solved by iteration, from methods that work on them (the
                    unknowns X of
@@ -71,7 +73,7 @@ class Solution:
     history: tuple[dict[str, float], ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     message: str = ""
-    notes: tuple[str, ...] = ()
+    notes: Sequence[str] = ()
     proof: Infeasible | None = None
     displacements: Stacked | None = None
 
