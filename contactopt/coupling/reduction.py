@@ -109,12 +109,16 @@ class Reduction:
     @property
     def gap(self) -> np.ndarray:
         """The initial gap (k,) of all contacts [length]."""
-        return np.concatenate([made.gap for made in self.couplings])
+        return self._of_all([made.gap for made in self.couplings])
 
     @property
     def frames(self) -> np.ndarray:
         """The directions n, t1[, t2] of all contacts as rows (k, dim, dim)."""
-        return np.concatenate([made.frames for made in self.couplings])
+        return self._of_all([made.frames for made in self.couplings])
+
+    @staticmethod
+    def _of_all(parts: list[np.ndarray]) -> np.ndarray:
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     @property
     def operator(self) -> InterfaceOperator:
@@ -299,7 +303,8 @@ def reduce_bodies(
         check_dense(round(filling(maps) ** 0.5))
     with one_blas_thread() if iterate else nullcontext():
         bodies = each(lambda body: body.prepare(solver, not implicit), assembled)
-        give_back()
+        if any(body.work.stiffness for body in assembled):
+            give_back()
     times.append(time.perf_counter())
 
     form = compliance(bodies, maps, couplings, implicit)
