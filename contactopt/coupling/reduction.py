@@ -109,15 +109,12 @@ class Reduction:
     @property
     def gap(self) -> np.ndarray:
         """The initial gap (k,) of all contacts [length]."""
-        return self._of_all([made.gap for made in self.couplings])
+        return np.concatenate([made.gap for made in self.couplings])
 
     @property
     def frames(self) -> np.ndarray:
         """The directions n, t1[, t2] of all contacts as rows (k, dim, dim)."""
-        return self._of_all([made.frames for made in self.couplings])
-
-    @staticmethod
-    def _of_all(parts: list[np.ndarray]) -> np.ndarray:
+        parts = [made.frames for made in self.couplings]
         return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     @property

@@ -227,24 +227,17 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
 def is_round(problem: InterfaceProblem, inside: np.ndarray) -> bool:
     """Whether a zone on a surface, scaled to equal axes, is more an ellipse than a rectangle."""
     areas = problem.areas
-    x, own = _from_centre(problem, inside, areas, inside), areas[inside]
+    x, own = _from_centre(problem, inside, areas)[:, inside], areas[inside]
     scaled, _ = _as_disc(problem, x, slice(None), own)
     disc = np.sqrt(own.sum() / np.pi)
     return bool(np.linalg.norm(scaled, axis=0).max() <= 1.12 * disc)  # a disc has 1
 
 
-def _from_centre(
-    problem: InterfaceProblem,
-    inside: np.ndarray,
-    weights: np.ndarray,
-    some: np.ndarray | slice = slice(None),
-) -> np.ndarray:
-    """(2, m) places of `some` contacts, by default of all, from the centre of gravity of a zone,
-    which planes of symmetry hold.
-    """
+def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(2, k) places from the centre of gravity of a zone, which planes of symmetry hold."""
     x, w = problem.chart.places, weights[inside]
     centre = np.where(problem.chart.mirrored, 0.0, x[:, inside] @ w / w.sum())
-    return np.asarray(x[:, some] - centre[:, None])
+    return np.asarray(x - centre[:, None])
 
 
 def _as_disc(
