@@ -55,7 +55,7 @@ def cubes(shapes: tuple[str, str], degree: int = 1, **contact) -> Scene:
     floor = (*sides, Support("bottom", {"z": 0.0}))
     lower = Part("lower", cube(0.0, shapes[1]), MATERIAL, floor, contact="top")
     mu = 0.3 if contact.get("law", "coulomb") == "coulomb" else 0.0
-    pair = Contact("upper", "lower", mu, **contact)
+    pair = Contact("upper", "lower", **{"mu": mu} | contact)
     return Scene("cubes", bodies=(upper, lower), contacts=(pair,), kind="solid", degree=degree)
 
 
