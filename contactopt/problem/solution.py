@@ -56,8 +56,8 @@ class Solution:
                  own names it: recovery, the coarse meshes before this one, the phases of a
                  reduction
     notes        sentences about what was unexpected in the solve: a fallback, a stage
-                 that failed. Of few contacts, whether the forces are nearly not unique is looked
-                 for when they are read
+                 that failed. The one that says that the forces of few contacts are nearly not
+                 unique is made at the first reading, since it costs more than the solve
     proof        status `infeasible`: what proves that there is no solution
     displacements  of the bodies that are solved by iteration, from methods that work on them (the
                    unknowns X of
