@@ -74,10 +74,17 @@ class Locally:
         self.last: Solved | None = None
         self.splits = 0
 
-    def _see(self) -> None:
-        """Divide elements at contacts that are too small for the first mesh."""
+    def _see(self, peaks: Sequence[Peak] = ()) -> None:
+        """Divide elements at contacts that are too small for the first mesh, and where a quantity
+        has peaks, only at the contacts in which they lie.
+        """
+        places = np.transpose([peak.place for peak in peaks]) if peaks else None
+        contacts = {
+            body: [own for own in found if places is None or own.away(places).min() <= own.size]
+            for body, found in self.unseen.items()
+        }
         if self.unseen:
-            see = partial(seeing, contacts=self.unseen, across=self.across, shapes=self.shapes)
+            see = partial(seeing, contacts=contacts, across=self.across, shapes=self.shapes)
             self.states = [see(scene) for scene in self.states]
 
     def solve(self) -> Solved:
@@ -154,7 +161,7 @@ class Locally:
         self.states = [finer(scene, marked, self.shapes) for scene in self.states]
         if reading.uncertainty > judged.size / 3:
             self.across *= 2
-            self._see()
+            self._see(reading.peaks)
         return float(unknowns(self.states[-1]))
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:

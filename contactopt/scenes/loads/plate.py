@@ -29,6 +29,12 @@ class Plate(Load):
     def values(self, components: tuple[str, ...]) -> dict[str, float]:
         return dict(self.force)
 
+    def words(self, components: tuple[str, ...]) -> str:
+        held = ", ".join(name for name in components if name not in self.force)
+        return super().words(components) + (
+            f"; glued, it holds {held}" if self.glued and held else ""
+        )
+
     def with_values(self, values: Mapping[str, float]) -> Plate:
         return replace(self, force=dict(values))
 
