@@ -13,6 +13,7 @@ from contactopt import (
     InputError,
     Material,
     Part,
+    Plate,
     Pressure,
     Rigid,
     Scene,
