@@ -72,19 +72,18 @@ class Locally:
         self.values: list[float] = []
         self.errors: list[ElementErrors] = []
         self.last: Solved | None = None
-        self.splits = 0
 
     def _see(self, peaks: Sequence[Peak] = ()) -> None:
-        """Divide elements at contacts that are too small for the first mesh, and where a quantity
-        has peaks, only at the contacts in which they lie.
-        """
-        places = np.transpose([peak.place for peak in peaks]) if peaks else None
-        contacts = {
-            body: [own for own in found if places is None or own.away(places).min() <= own.size]
-            for body, found in self.unseen.items()
-        }
-        if self.unseen:
-            see = partial(seeing, contacts=contacts, across=self.across, shapes=self.shapes)
+        """Divide elements at contacts too small for the first mesh; with peaks, only at theirs."""
+        found = self.unseen
+        if peaks:
+            places = np.transpose([peak.place for peak in peaks])
+            found = {
+                body: [own for own in made if own.away(places).min() <= own.size]
+                for body, made in found.items()
+            }
+        if found:
+            see = partial(seeing, contacts=found, across=self.across, shapes=self.shapes)
             self.states = [see(scene) for scene in self.states]
 
     def solve(self) -> Solved:
@@ -130,9 +129,8 @@ class Locally:
         return len(self.values) > (1 if self.unseen else 2)
 
     def facts(self, solved: Solved) -> dict[str, Any]:
-        if not self.whole:
-            return {}
-        return {"elements": self.states[-1].elements, "splits": len(self.values)}
+        made = {"elements": self.states[-1].elements, "splits": len(self.values)}
+        return made if self.whole else {}
 
     def advance(
         self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]

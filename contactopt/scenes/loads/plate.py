@@ -30,10 +30,8 @@ class Plate(Load):
         return dict(self.force)
 
     def words(self, components: tuple[str, ...]) -> str:
-        held = ", ".join(name for name in components if name not in self.force)
-        return super().words(components) + (
-            f"; glued, it holds {held}" if self.glued and held else ""
-        )
+        held = ", ".join(c for c in components if self.glued and c not in self.force)
+        return super().words(components) + (f"; glued, it holds {held}" if held else "")
 
     def with_values(self, values: Mapping[str, float]) -> Plate:
         return replace(self, force=dict(values))
