@@ -202,3 +202,18 @@ def test_what_stiffens_no_body_is_told_in_every_run_with_the_mesh(tmp_path, name
     remarks = run(Scene("one", part, Rigid("floor"), 0.0, kind=kind)).summary["remarks"]
     of_the_file = [text for text in remarks if str(tmp_path) in text]
     assert [text.startswith(f"{tmp_path}/{told}") for text in of_the_file] == [True] * bool(told)
+
+
+@pytest.mark.parametrize(("at", "said"), [(0, True), (1, False)])
+def test_other_nodes_with_the_name_of_a_surface_are_told(tmp_path, caplog, at, said):
+    """Abaqus keeps names of surfaces and of sets of nodes apart; a boundary has one of them."""
+    shape = block("quad", 1, (2, 1))
+    sides = "\n".join(f"{number}, S{label}" for number, label in shape.side(1, 1))
+    path = tmp_path / "two.inp"
+    path.write_text(
+        f"*NODE\n{node_rows(shape)}\n*ELEMENT, TYPE=CPE4\n{element_rows(shape.elements)}\n"
+        f"*NSET, NSET=face\n{', '.join(map(str, shape.on(1, at)))}\n*SURFACE, NAME=face\n{sides}\n"
+    )
+    mesh = load_mesh(path)
+    assert np.all(mesh.p[1, mesh.facets[:, mesh.boundaries["face"]]] == 1)
+    assert ("facets and other nodes are both named face" in caplog.text) == said
