@@ -34,7 +34,7 @@ from jax import lax
 
 from contactopt.cards import count
 from contactopt.defaults import TOL
-from contactopt.derivatives.factors import UNSEEN, Whole
+from contactopt.derivatives.factors import UNSEEN, Square, Whole
 from contactopt.derivatives.gradient import gradient
 from contactopt.derivatives.interface import Sensitivity, told_apart
 from contactopt.derivatives.states import chain_of
@@ -42,6 +42,7 @@ from contactopt.errors import InputError
 from contactopt.methods.batch import problems_of, solve_all
 from contactopt.methods.driver import solve as solve_problem
 from contactopt.problem import InterfaceProblem
+from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.readings.quantities import seeds_of
 from contactopt.runner import run, scene_of
 from contactopt.scenes.parameters import parameters as parameters_of
@@ -120,9 +121,13 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
         return shaped(points, data)
 
     def linearised(*data: Arrays) -> Arrays:
-        results: list[Arrays] = []
-        for at in map(_smooth, found(data)):
-            tangent, by_mu = at.tangent, np.broadcast_to(at.by_parameter, at.problem.q.shape)
+        results, points = list[Arrays](), found(data)
+        for at, made in zip(points, _together(points)):
+            if made is not None:
+                results.append(made)
+                continue
+            by_mu = np.broadcast_to(at.by_parameter, at.problem.q.shape)
+            tangent = _smooth(at).tangent
             whole = tangent.factors.whole
             if not whole.unique:
                 warnings.warn(UNDETERMINED, stacklevel=2)
@@ -142,6 +147,36 @@ def _solver(tol: float, **settings: Any) -> Callable[..., Any]:
     act = jax.custom_jvp(lambda *data: _outside(solved, (data[1], data[4]), "broadcast_all", *data))
     act.defjvp(rule)
     return jax.jit(act)
+
+
+def _together(points: list[Sensitivity]) -> list[Arrays | None]:
+    """What `linearised` gives for many problems without motions, made for all at once. None for
+    those with a kink, a singular matrix M, or contacts that are much stiffer than others.
+    """
+    problems = [at.problem for at in points]
+    if len(points) < 2 or problems[0].s.size or not problems[0].q.size:
+        return [None] * len(points)
+    Q, q, mu = (np.stack([getattr(p, name) for p in problems]) for name in ("Q", "q", "mu"))
+    (b, k, d), own = q.shape, np.arange(q.shape[1])
+    r = np.stack([at.solution.reactions for at in points])
+    compliance = Q.diagonal(0, 1, 2).reshape(b, k, d)
+    near = [at.distance for at in points] * np.linalg.norm(r, axis=2).max(axis=1)
+    usual = (compliance.min(axis=(1, 2)) > 1e-3 * compliance.max(axis=(1, 2))) & (near > 0)
+    rho, law = 1 / np.where(usual[:, None], compliance.mean(axis=2), 1.0), Coulomb(mu.ravel())
+    y = (r - rho[:, :, None] * ((Q @ r.reshape(b, -1, 1)).reshape(r.shape) + q)).reshape(-1, d)
+    kinks = law.kinks(y, np.repeat(near, k))  # type: ignore[arg-type]
+    usual &= ~(kinks.normal | kinks.tangential).reshape(b, k).any(axis=1)
+    D, by_mu = law.project(y)[1], law.project_by_parameter(y).reshape(r.shape)
+    D[~law.rough, 1:] = 0.0  # no friction, no tangential force
+    D = D.reshape(b, k, d, d)
+    M = (D * rho[:, :, None, None] @ Q.reshape(b, k, d, -1)).reshape(b, k, d, k, d)
+    M[:, own, :, own] += (np.eye(d) - D).swapaxes(0, 1)
+    rows, ones, made = np.arange(k * d), np.ones((2, k * d)), list[Arrays | None]([None] * b)
+    for i in np.flatnonzero(usual):
+        if (square := Square(M[i].reshape(k * d, -1))).unique:
+            whole = square.lu.T, rows, square.order, ones, True
+            made[i] = (r[i], problems[i].s, rho[i], D[i], by_mu[i], *whole)
+    return made
 
 
 def _change(

@@ -11,6 +11,7 @@ jax.config.update("jax_enable_x64", True)
 import jax.numpy as jnp  # noqa: E402
 
 import contactopt  # noqa: E402
+from contactopt.derivatives import linear  # noqa: E402
 from contactopt.jax import Kink, quantity, solve  # noqa: E402
 
 
@@ -74,6 +75,23 @@ def test_systems_of_several_problems_are_told_apart():
             one = jax.jacfwd(lambda x, mu=friction: solve(Q, x, mu, V, s)[0])(q + lift)
             assert np.abs(one).max() > 0.1
             assert np.allclose(each[i, j], one, atol=1e-10)
+
+
+def test_the_systems_of_a_batch_are_made_at_once(monkeypatch):
+    Q, q, mu, *_ = data()
+    many = jnp.stack([q, 1.1 * q, q - 0.2])
+    slope = jax.grad(lambda x, Q=Q: jnp.sin(solve(Q, x, mu)[0]).sum())
+    single = [slope(one) for one in many]
+    monkeypatch.setattr(linear, "dense_factors", None)
+    assert np.allclose(jax.vmap(slope)(many), single, atol=1e-10)
+
+
+def test_a_kink_in_a_batch_leaves_the_others_alone():
+    Q, q = np.eye(4), jnp.array([[-1.0, 0.0], [0.0, 0.0]])
+    many = jnp.stack([q, q + jnp.array([[0.0, 0.1], [1.0, 0.0]])])
+    with pytest.warns(Kink, match="1 "):
+        by = jax.vmap(jax.grad(lambda x: solve(Q, x, 0.3)[0][0, 0]))(many)
+    assert np.allclose(by[:, 0], [-1.0, 0.0])
 
 
 def test_a_kink_is_reported():
