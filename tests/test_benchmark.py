@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from contactopt import InputError, benchmark, solve
-from contactopt.benchmark import problems, store
+from contactopt.benchmark import families, problems, store
 from contactopt.benchmark.experiment import read_experiment
+from contactopt.benchmark.families import FAMILIES, of_scenes
 from contactopt.benchmark.measure import Task
 from contactopt.benchmark.pool import Shares, Worker
 from contactopt.benchmark.runs import MethodSpec, Run
@@ -232,7 +233,7 @@ def test_optional_problems_and_methods_are_left_out_where_they_are_missing(tmp_p
         read_experiment(
             written(tmp_path, text.replace('"${SOME_FOLDER}"\noptional = true', '"${SOME_FOLDER}"'))
         )
-    fclib.write(problems.FAMILIES["rigid_bodies"](3, 4), tmp_path / "a.hdf5")
+    fclib.write(FAMILIES["rigid_bodies"](3, 4), tmp_path / "a.hdf5")
     monkeypatch.setenv("SOME_FOLDER", str(tmp_path))
     table = run(tmp_path, text, filters=["problem=a"])
     assert set(table["problem"]) == {"a"} and set(table["status"]) == {"solved"}
@@ -261,27 +262,27 @@ def test_a_worker_stays_with_its_problem():
 
 
 def test_families_are_what_they_say():
-    rank_deficient = problems.FAMILIES["rigid_bodies"](4, 20, seed=1)
+    rank_deficient = FAMILIES["rigid_bodies"](4, 20, seed=1)
     assert np.linalg.matrix_rank(rank_deficient.Q) <= 24
-    line = problems.half_plane(400)
+    line = families.half_plane(400)
     solution = solve(line)
     r, x = solution.reactions[:, 0], line.coordinates[0]
     assert solution.solved and abs(r.sum() - 0.25) < 1e-9
     # Hertz: a = 1/2, P = 1/4
     exact = np.sqrt(np.maximum(0.25 - x**2, 0)) * 2 * 0.25 / (np.pi * 0.25)
     assert np.abs(r / line.areas - exact).max() < 0.02 * exact.max()
-    assert np.linalg.eigvalsh(problems.half_plane(50, coupling=0.4).Q).min() > 0
-    held = problems.tangential("punch-2d", elements=4)
+    assert np.linalg.eigvalsh(families.half_plane(50, coupling=0.4).Q).min() > 0
+    held = families.tangential("punch-2d", elements=4)
     r = solve(held, tol=1e-12).reactions
     np.testing.assert_allclose(r[:, 0], -held.q[:, 0] / np.diag(held.Q)[::2], rtol=1e-9)
     assert (np.abs(r[:, 1]) <= 0.5 * r[:, 0] * (1 + 1e-9)).all() and np.abs(r[:, 1]).max() > 0
     plain, twice = (
-        problems.reduced("punch-2d", elements=4),
-        problems.redundant("punch-2d", elements=4, copies=2),
+        of_scenes.reduced("punch-2d", elements=4),
+        families.redundant("punch-2d", elements=4, copies=2),
     )
     shared = solve(twice, tol=1e-10).reactions.reshape(plain.contacts, 2, 2).sum(axis=1)
     np.testing.assert_allclose(shared, solve(plain, tol=1e-10).reactions, atol=1e-5)
-    units = problems.in_units("punch-2d", force=1e-3, length=1e-3, elements=4)
+    units = families.in_units("punch-2d", force=1e-3, length=1e-3, elements=4)
     np.testing.assert_allclose(
         solve(units).reactions, 1e-3 * solve(plain).reactions, rtol=1e-6, atol=1e-9
     )
@@ -299,10 +300,10 @@ def test_labels_tell_numbers_apart():
 
 
 def test_materials_of_scenes_by_name():
-    made = problems.scene("punch-2d", upper_nu=0.49, stiffness_ratio=10.0)
+    made = of_scenes.scene("punch-2d", upper_nu=0.49, stiffness_ratio=10.0)
     assert made.upper.material.nu == 0.49 and made.lower.material.E == 10 * made.upper.material.E
     with pytest.raises(InputError, match="not both"):
-        problems.scene("punch-2d", lower_E=2.0, stiffness_ratio=10.0)
+        of_scenes.scene("punch-2d", lower_E=2.0, stiffness_ratio=10.0)
 
 
 @pytest.mark.slow

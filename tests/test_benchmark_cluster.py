@@ -9,9 +9,11 @@ import time
 import pytest
 
 from contactopt import InputError
+from contactopt.benchmark import cluster as cluster_module
 from contactopt.benchmark.campaign import run_campaign
-from contactopt.benchmark.cluster import run_on_cluster, shard_of
+from contactopt.benchmark.cluster import batches, run_on_cluster, shard_of
 from contactopt.benchmark.experiment import read_experiment
+from contactopt.benchmark.measure import Task
 from contactopt.benchmark.merging import joined
 from contactopt.benchmark.pool import History
 from contactopt.benchmark.store import load
@@ -110,6 +112,46 @@ def test_a_killed_worker_loses_nothing_and_rows_are_those_of_one_machine(cluster
     assert len(found) == len(here) and found["success"].all()
     kept = [t.sort_values(SAME[:4])[SAME].to_csv(index=False) for t in (found, here)]
     assert kept[0] == kept[1]
+
+
+def test_batches_keep_problems_together_and_split_few_of_them_by_methods(tmp_path):
+    runs = read_experiment(written(tmp_path, SMALL)).runs()
+    tasks = [Task(run, "small", (), 10.0, 4.0, 100, 0) for run in runs]
+    for wanted, number in ((0, 3), (3, 3), (4, 6), (100, 6)):  # of 3 problems and 2 methods
+        made = batches(tasks, wanted)
+        assert len(made) == number and sum(map(len, made)) == len(tasks)
+        assert all(len({task.run.problem.label for task in batch}) == 1 for batch in made)
+        pairs = [{(t.run.problem.label, t.run.method.label) for t in batch} for batch in made]
+        assert sum(map(len, pairs)) == len(set.union(*pairs)) == 6
+        order = [[tasks.index(task) for task in batch] for batch in made]
+        assert all(batch == sorted(batch) for batch in order)
+
+
+class Kept:
+    """A worker that only knows whether it was closed."""
+
+    closed = False
+
+    def close(self):
+        self.closed = True
+
+
+def test_a_worker_waits_for_the_next_batch_of_its_campaign_only(monkeypatch):
+    monkeypatch.setattr(cluster_module, "Worker", Kept)
+    waiting = cluster_module._Waiting()
+    first = waiting.take("a")
+    waiting.leave("a", first)
+    assert waiting.take("a") is first and waiting.take("a") is not first
+    waiting.leave("a", first)
+    other = waiting.take("b")
+    assert other is not first and first.closed and not waiting.workers
+    monkeypatch.setattr(cluster_module, "IDLE", 0.01)
+    waiting.leave("b", other)
+    for _ in range(500):
+        if other.closed:
+            break
+        time.sleep(0.01)
+    assert other.closed and not waiting.workers
 
 
 def test_an_address_without_a_scheduler_is_one_sentence(monkeypatch):

@@ -17,7 +17,7 @@ import glob, os, subprocess, sys, time
 import numpy as np
 from contactopt import solve
 from contactopt.benchmark import Answer, method
-from contactopt.benchmark.problems import FAMILIES
+from contactopt.benchmark.families import FAMILIES
 
 known = {}
 

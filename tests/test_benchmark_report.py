@@ -27,13 +27,7 @@ REPORTS = Path(__file__).parents[1] / "reports"
 def table(**columns) -> pd.DataFrame:
     """Rows with the given columns; the others as in a successful run."""
     size = max(len(v) for v in columns.values())
-    usual = {
-        "setting": "mid",
-        "tolerance": 1e-6,
-        "start": "cold",
-        "repeat": 0,
-        "success": True,
-    }
+    usual = {"setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True}
     usual |= {
         "claimed": True,
         "status": "solved",
@@ -189,10 +183,7 @@ def reported(tmp_path_factory):
 def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     monkeypatch.chdir(reported)
     text = Path("reports/small/report.md").read_text()
-    for made in (
-        *Path("reports/small").glob("figure-*"),
-        Path("reports/small/report.md"),
-    ):
+    for made in (*Path("reports/small").glob("figure-*"), Path("reports/small/report.md")):
         made.unlink()
 
     def forbidden(*arguments, **settings):
@@ -329,10 +320,19 @@ def test_pandas_alone_recomputes_five_findings_of_the_report(capsys, monkeypatch
     said, report = capsys.readouterr().out, (REPORTS / "small_tier" / "report.md").read_text()
     solvers, alone, along = re.findall(r"(\d+) (?:solvers|problems|runs)", said)
     assert f"{solvers} solvers on {alone} problems and on {along} runs" in report
-    for where, external, own in re.findall(r"(\d) dimensions.*?(\d+) and auto (\d+)", said):
+    leaders = re.findall(r"leader: (.*) (\d+ of \d+) (\S+)", said)
+    first = report.partition("*Table 1.")[0].splitlines()
+    for name, solved, mean in leaders:
+        (cells,) = [row.split(" | ") for row in first if row.split(" | ")[1:2] == [name]]
+        assert cells[2] == solved and cells[4] == mean
+    assert len(leaders) == 3
+    for where, external, own, ratio in re.findall(
+        r"(\d) dimensions.*?(\d+) and auto (\d+) in (\S+)", said
+    ):
         place = {"2": "in the plane", "3": "in space"}[where]
         (line,) = [text for text in report.splitlines() if f"problems {place} without" in text]
         assert f"reach 1e-6 on {external}, " in line and f"`auto` on {own}." in line
+        assert f"CPU time of `auto` is {ratio} times that of the best" in line
     for method, number in re.findall(r"^(\S.*?) +(\d+)$", said, re.M)[-5:]:
         solved = re.search(rf"`{re.escape(method)}` (\d+) and (\d+), ", report)
         assert solved is None or sum(map(int, solved.groups())) == int(number), method

@@ -9,8 +9,8 @@ import pytest
 import contactopt
 from contactopt import InputError, InterfaceProblem, benchmark, natural_map_residual
 from contactopt.benchmark import peers
+from contactopt.benchmark.families import FAMILIES
 from contactopt.benchmark.peers import Peer
-from contactopt.benchmark.problems import FAMILIES
 from contactopt.problem.laws.coulomb import Coulomb
 from experiments.peers import cone_solvers, pinocchio_admm, siconos_numerics
 from tests.test_benchmark import run, written

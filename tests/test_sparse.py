@@ -5,8 +5,8 @@ import pytest
 import scipy.sparse as sp
 
 from contactopt import InputError, InterfaceProblem, fclib, natural_map_residual, solve
+from contactopt.benchmark.families import FAMILIES
 from contactopt.benchmark.families.packings import packing
-from contactopt.benchmark.problems import FAMILIES
 from contactopt.linear.operators import asymmetry, block, dense, diagonal, held, shifted
 from contactopt.methods.kernels.interior import interior_iterates
 from contactopt.methods.kernels.sparse_blocks import DenseBlocks, SparseBlocks

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from contactopt import all_solutions, fclib, natural_map_residual, solve
 from contactopt.benchmark import read_experiment, testset
-from contactopt.benchmark.problems import FAMILIES
+from contactopt.benchmark.families import FAMILIES
 from contactopt.benchmark.sequences import Sequence, certificate, states_of
 from contactopt.benchmark.testset.programs import PROGRAMS, convex_program, write_cbf, write_npz
 from contactopt.benchmark.testset.tags import invariants

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from contactopt.benchmark.cluster import run_on_cluster, shard_of
-from contactopt.benchmark.experiment import Experiment, NothingToRun, read_experiment
+from contactopt.benchmark.experiment import Experiment, NothingToRun, read_apart
 from contactopt.benchmark.measure import Task, absent_row, calibration
 from contactopt.benchmark.pool import History, run_locally
 from contactopt.benchmark.report_page import report_campaign
@@ -59,7 +59,7 @@ def run_campaign(
         folder without `resume`, and a folder that cannot be written to.
     """
     require("pandas", "psutil", "pyarrow")
-    e = experiment if isinstance(experiment, Experiment) else read_experiment(experiment)
+    e = experiment if isinstance(experiment, Experiment) else read_apart(experiment)
     jobs = jobs if jobs is not None else os.cpu_count() or 1
     check_count("jobs", jobs)
     runs = e.runs(filters)
@@ -163,7 +163,7 @@ def run_reports(
 def _renew(path: Path, quick: bool, work: Path, target: Path, jobs: int | None) -> None:
     """Run an experiment again in a folder of `work`, and put its small table into `target`."""
     try:
-        experiment = read_experiment(path, quick)
+        experiment = read_apart(path, quick)
     except NothingToRun as error:
         print(f"left out: {error}", file=sys.stderr)
         return

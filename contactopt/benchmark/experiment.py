@@ -13,18 +13,24 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from contactopt.benchmark.entries import Entries, size_of, twice_in
+from contactopt.benchmark.families import FAMILIES
 from contactopt.benchmark.keys import EXPERIMENT
 from contactopt.benchmark.keys import KINDS as FIGURE_KINDS
 from contactopt.benchmark.plugins import Registry, source_of
-from contactopt.benchmark.problems import FAMILIES, KINDS, ProblemSpec, named
+from contactopt.benchmark.problems import KINDS, ProblemSpec, named
+from contactopt.benchmark.process import Ended, Process
 from contactopt.benchmark.runs import SETTINGS, MethodSpec, Run, method_spec
 from contactopt.benchmark.testset.problem_set import of_set
 from contactopt.checks import check_name, check_number, short
 from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, read_table
+from contactopt.methods import METHODS
 
 MOST_RUNS = 200_000  # of one experiment
+READ_LIMIT = 600.0  # s to load plug-ins and to find their external solvers
 # key -> the limits of its value, closed; s; GB: less holds no NumPy and SciPy; NumPy's generator
 # takes no larger seed
 LIMITS = {
@@ -159,6 +165,37 @@ def read_experiment(path: str | Path, quick: bool = False) -> Experiment:
         ),
         sources={name: source_of(make) for name, make in declared.items()},
     )
+
+
+def read_apart(path: str | Path, quick: bool = False) -> Experiment:
+    """The same as `read_experiment`. Plug-ins are loaded in a process that ends, since what their
+    files do to the library while they are loaded must not reach the process that judges answers.
+    """
+    data = _checked(Path(path), quick).data
+    entries = [entry for entry in data.get("methods", ()) if isinstance(entry, dict)]
+    names = {str(name) for entry in entries for name in np.atleast_1d(entry.get("method", ""))}
+    if not data.get("plugins") and names <= {*METHODS}:
+        return read_experiment(path, quick)
+    reader = Process()
+    try:
+        found = reader.ask(READ_LIMIT, "read", _read, path, quick)
+    except (Ended, RuntimeError) as error:
+        status = f"{error.status}: " if isinstance(error, Ended) else ""
+        raise InputError(f"'{path}': its plug-ins cannot be loaded: {status}{error}.") from error
+    finally:
+        reader.kill()
+    if isinstance(found, Experiment):
+        return found
+    nothing, message = found
+    raise NothingToRun(message) if nothing else InputError(message)
+
+
+def _read(path: str | Path, quick: bool) -> Experiment | tuple[bool, str]:
+    """An experiment, or its error: whether nothing is left to run, and the message."""
+    try:
+        return read_experiment(path, quick)
+    except InputError as error:
+        return isinstance(error, NothingToRun), str(error)
 
 
 def read_layout(path: str | Path) -> Experiment:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from contactopt.benchmark import worker
+from contactopt.benchmark.families import FAMILIES
 from contactopt.benchmark.pool import BUILD_LIMIT
-from contactopt.benchmark.problems import FAMILIES, ProblemSpec, named
+from contactopt.benchmark.problems import ProblemSpec, named
 from contactopt.benchmark.process import Ended, Process, one_line
 from contactopt.benchmark.sequences import Sequence as States
 from contactopt.benchmark.sequences import certificate

@@ -9,10 +9,10 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 from typing import Any
 
 from contactopt.benchmark import worker
+from contactopt.benchmark.families import FAMILIES
 from contactopt.benchmark.measure import Task, blank, judge
 from contactopt.benchmark.peers import Answer
-from contactopt.benchmark.problems import FAMILIES
-from contactopt.benchmark.process import KILLED, START, Ended, Process, one_line
+from contactopt.benchmark.process import KILLED, LOAD_LIMIT, START, Ended, Process, one_line
 from contactopt.benchmark.runs import Run
 from contactopt.benchmark.sequences import Sequence as States
 from contactopt.errors import InputError
@@ -31,15 +31,15 @@ _cold: set[str] = set()  # methods that did not survive their warm-up, in any wo
 
 
 class Worker:
-    """Two processes: one builds problems and never runs a method, one runs methods and never builds
-    a problem.
+    """Three processes: one builds problems and never runs a method, one runs methods of this
+    package, and one runs plug-ins, which no other process loads.
 
     Between them the problem is held here, where no plug-in runs, and every answer is judged by it.
     `run` blocks; use from one thread.
     """
 
     def __init__(self) -> None:
-        self.builder, self.solver = Process(), Process()
+        self.builder, self.solver, self.guest = self.processes = Process(), Process(), Process()
         self.held = ""  # label of the problem that is held, with the columns that it fills
         self.problem: InterfaceProblem | States
         self.facts: dict[str, Any]
@@ -52,13 +52,13 @@ class Worker:
         self.close()
 
     def close(self) -> None:
-        self.builder.kill()
-        self.solver.kill()
+        for process in self.processes:
+            process.kill()
 
     def interrupt(self) -> None:
         """Let `run` end soon, from another thread."""
-        self.builder.interrupt()
-        self.solver.interrupt()
+        for process in self.processes:
+            process.interrupt()
 
     def row(self, task: Task, known: History) -> dict[str, Any] | None:
         """The row of this run, which `known` then knows; None if it needs no repeat."""
@@ -83,26 +83,32 @@ class Worker:
             words = "not made: a looser tolerance already took more than the time limit"
             return row | {"status": "time_limit", "message": words, "call_seconds": task.time_limit}
         # a plug-in may keep answers, and what it does to its process, to itself; a peer has another
-        alone = task.run.method.foreign and not task.run.method.peer
+        process = self._process(task)
+        alone = process is self.guest and not task.run.method.peer
         begin = time.perf_counter()
         try:
-            answer = self._answer(task)
+            answer = self._answer(task, process)
+        except RuntimeError as error:  # a plug-in cannot be loaded any more
+            return row | {"message": one_line(str(error))}
         except Ended as end:
             spent = time.perf_counter() - begin
             leaked = end.held > 0.8 * task.memory_limit  # Python holds less when a request fails
             status = "out_of_memory" if leaked else end.status
             return row | {"status": status, "message": str(end), "call_seconds": spent}
-        if alone:
-            self.solver.kill()
-            self.solver.start()
+        if alone:  # the next one starts when it is asked: until then another run may be timed
+            process.kill()
         return row | judge(task, self.problem, answer)
+
+    def _process(self, task: Task) -> Process:
+        """The process that runs the method."""
+        return self.guest if task.run.method.foreign else self.solver
 
     def _build(self, task: Task) -> None:
         """Hold the task's problem, or why it cannot be built."""
         spec = task.run.problem
         if spec.label in (self.held, *self.broken):
             return
-        self.solver.start()  # imports at the same time
+        self._process(task).start()  # imports at the same time
         foreign = spec.kind == "family" and spec.name not in FAMILIES
         request = (spec, task.plugins if foreign else (), task.diagnose, task.memory_limit)
         for _ in range(2):  # killed once may be chance, and would cost all runs of the problem
@@ -120,17 +126,17 @@ class Worker:
         else:
             self.held, (self.problem, self.facts) = spec.label, found
 
-    def _answer(self, task: Task) -> Answer:
+    def _answer(self, task: Task, process: Process) -> Answer:
         """What the method answers. Raises Ended if its process did not outlive it."""
         answer = None
         while answer is None:  # its process may have been replaced since it got the problem
             try:
-                self._prepare(task)
+                self._prepare(task, process)
                 hard = MARGIN * task.time_limit + GRACE
                 hard += 30.0 if task.run.method.peer else 0.0  # s to start and take the problem
-                answer = self.solver.ask(hard, "solve", worker.execute, task)
+                answer = process.ask(hard, "solve", worker.execute, task)
             except Ended as end:
-                self.solver.kill()
+                process.kill()
                 if end.phase == START:
                     raise InputError(
                         f"a worker process cannot start ({end.status},"
@@ -140,22 +146,24 @@ class Worker:
                     raise
                 _cold.add(task.run.method.name)
         if answer.status == "out_of_memory":
-            self.solver.kill()  # its memory is fragmented at best
+            process.kill()  # its memory is fragmented at best
         return answer
 
-    def _prepare(self, task: Task) -> None:
+    def _prepare(self, task: Task, process: Process) -> None:
         """Give the process the problem, and let it import what the method needs."""
         method, dim = task.run.method, self.problem.dim
-        if self.solver.known.get("problem") != self.held:
-            given = (self.held, self.problem, task.plugins)
-            self.solver.ask(BUILD_LIMIT, "send", worker.hold, *given)
-            self.solver.known["problem"] = self.held
+        if method.foreign and "plug-ins" not in process.known:
+            process.ask(LOAD_LIMIT, "load", worker.load, task.plugins)
+            process.known["plug-ins"] = "loaded"
+        if process.known.get("problem") != self.held:
+            process.ask(BUILD_LIMIT, "send", worker.hold, self.held, self.problem)
+            process.known["problem"] = self.held
         warm = f"warm {method.label} {dim}"
-        if warm not in self.solver.known and method.name not in _cold:
+        if warm not in process.known and method.name not in _cold:
             least = PLUGIN_WARM_UP if method.foreign else WARM_UP
             limit = max(MARGIN * task.time_limit + GRACE, least)
-            self.solver.ask(limit, "warm up", worker.warm_up, task, dim)
-            self.solver.known[warm] = method.label
+            process.ask(limit, "warm up", worker.warm_up, task, dim)
+            process.known[warm] = method.label
 
 
 class Shares:
@@ -204,6 +212,13 @@ class History:
             self.once.add((*key, row["setting"]))
         if late:
             self.ended[key] = max(row["tolerance"], self.ended.get(key, 0.0))
+
+    def of(self, problem: str) -> History:
+        """What they say of the runs of one problem."""
+        made = History()
+        made.once = {key for key in self.once if key[0] == problem}
+        made.ended = {key: by for key, by in self.ended.items() if key[0] == problem}
+        return made
 
     def repeated(self, run: Run) -> bool:
         """Whether a run is a repeat of one that is made once."""

@@ -1,4 +1,6 @@
-"""Problems of an experiment file: scenes, FCLib files and generated families."""
+"""Problems of an experiment file: scenes, FCLib files and generated families. These are imported
+where they are built, so that a process that only runs methods starts sooner.
+"""
 
 import os
 from collections.abc import Callable, Mapping
@@ -7,39 +9,11 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
-from contactopt.benchmark.families.half_planes import half_plane
-from contactopt.benchmark.families.meshed_blocks import meshed_blocks
-from contactopt.benchmark.families.of_scenes import (
-    by_products,
-    held,
-    in_units,
-    reduced,
-    redundant,
-    scene,
-    skewed,
-    tangential,
-)
-from contactopt.benchmark.families.packings import packing, rigid_bodies
-from contactopt.benchmark.families.rigid_blocks import rigid_blocks
-from contactopt.benchmark.families.sequences import growing_friction, load_path, settling
-from contactopt.benchmark.families.springs import springs
-from contactopt.benchmark.families.unsolvable import dragged, squeezed, toppled
 from contactopt.benchmark.sequences import Sequence
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem
 
 KINDS = ("scene", "fclib", "family")
-
-
-# families by name, one line for each file of contactopt.benchmark.families
-_RIGID = (rigid_bodies, packing, rigid_blocks)
-_ELASTIC = (half_plane, meshed_blocks, springs)
-_OF_SCENES = (by_products, held, tangential, redundant, in_units, skewed)
-_SEQUENCES = (load_path, growing_friction, settling)
-_UNSOLVABLE = (dragged, toppled, squeezed)
-FAMILIES: dict[str, Callable[..., Any]] = {
-    make.__name__: make for make in (*_RIGID, *_ELASTIC, *_OF_SCENES, *_SEQUENCES, *_UNSOLVABLE)
-}
 
 
 @dataclass(frozen=True)
@@ -61,6 +35,9 @@ class ProblemSpec:
 
     def check(self, declared: Mapping[str, Callable[..., Any]]) -> None:
         """InputError if the name or a parameter is unknown or out of range."""
+        from contactopt.benchmark.families import FAMILIES
+        from contactopt.benchmark.families.of_scenes import scene
+
         if self.kind == "scene":
             scene(self.name, **self.parameters)
         elif self.kind == "family":
@@ -76,6 +53,9 @@ class ProblemSpec:
 
     def build(self, declared: Mapping[str, Callable[..., Any]]) -> InterfaceProblem | Sequence:
         """The problem, or a sequence; InputError on parameters that make none."""
+        from contactopt.benchmark.families import FAMILIES
+        from contactopt.benchmark.families.of_scenes import reduced
+
         if self.kind == "scene":
             return reduced(self.name, **self.parameters)
         if self.kind == "fclib":

@@ -22,9 +22,9 @@ from contactopt.benchmark.peers import Answer, PeerAnswer
 from contactopt.benchmark.plugins import PASSED, Registry
 from contactopt.benchmark.problems import ProblemSpec
 from contactopt.benchmark.process import one_line
+from contactopt.benchmark.runs import MethodSpec
 from contactopt.benchmark.sequences import Sequence as States
 from contactopt.benchmark.sequences import states_of
-from contactopt.benchmark.store import STATUSES
 from contactopt.cards import count
 from contactopt.errors import BackendError, InputError
 from contactopt.linear.operators import form, has_entries
@@ -41,6 +41,8 @@ Call = Callable[[InterfaceProblem, bool, float], Answer]
 JOIN: dict[str, Callable[..., float]] = {
     "call_seconds": sum, "cpu_seconds": sum, "peak_mb": max, "base_mb": max,
 }  # fmt: skip
+# what a method may say of itself
+SAID = {word: word for word in (*(s.label for s in Status), "refused", "error", "out_of_memory")}
 FAILURES = {MemoryError: "out_of_memory", InputError: "refused", BackendError: "backend_failed"}
 
 
@@ -111,9 +113,13 @@ def _diagnosis(problem: InterfaceProblem) -> dict[str, float]:
     }
 
 
-def hold(label: str, problem: InterfaceProblem | States, paths: tuple[str, ...]) -> None:
-    """Keep a problem and plug-ins for the runs that follow."""
+def load(paths: tuple[str, ...]) -> None:
+    """Load the files of plug-ins."""
     _kept.plugins.load(paths)
+
+
+def hold(label: str, problem: InterfaceProblem | States) -> None:
+    """Keep a problem for the runs that follow."""
     parts = [part for state in states_of(problem) for part in (state, state.law, state.Q)]
     for part in parts:  # no run profits of what another one computed
         known = getattr(part, "__dict__", {})
@@ -147,8 +153,8 @@ def _measured(task: Task, problem: InterfaceProblem | States) -> Answer:
         call = _call(task)
         begin = [clock() for clock in CLOCKS]
         answer = _along(call, problem, task.time_limit)
-    except (Exception, SystemExit, KeyboardInterrupt) as error:
-        answer = Answer(_word(error), one_line(error))
+    except BaseException as error:
+        answer = Answer(_word(error), _said(error))
     wall, cpu, ended = (clock() - start for clock, start in zip(CLOCKS, begin))
     measured["call_seconds"] = wall
     measured["cpu_seconds"] = cpu + max(0.0, ended + _running_cpu() - others)
@@ -157,13 +163,21 @@ def _measured(task: Task, problem: InterfaceProblem | States) -> Answer:
         os._exit(1)
     try:
         if answer.measured:  # a peer measures itself, in its own process
-            bridge = measured["call_seconds"] - answer.measured["call_seconds"]
-            measured |= answer.measured | {"bridge_seconds": bridge}
-        if answer.reactions is not None:
-            answer = _in_form(answer, problem, measured["call_seconds"])
-    except (TypeError, ValueError, AttributeError, OverflowError) as wrong:
-        answer = Answer("error", f"its answer has the wrong form: {wrong}")
-    return replace(answer, message=one_line(answer.message), measured=measured)
+            own_part = {key: float(answer.measured[key]) for key in JOIN}
+            bridge = measured["call_seconds"] - own_part["call_seconds"]
+            measured |= own_part | {"bridge_seconds": bridge}
+        return _in_form(answer, problem, measured)
+    except Exception as wrong:  # whatever its parts do when they are read
+        words = one_line(f"its answer has the wrong form: {_said(wrong)}")
+        return Answer("error", words, measured=measured)
+
+
+def _said(error: BaseException) -> str:
+    """One line about an error, also about one that cannot be printed."""
+    try:
+        return one_line(error)
+    except Exception:
+        return type(error).__name__
 
 
 def _word(error: BaseException) -> str:
@@ -242,19 +256,19 @@ def _call(task: Task) -> Call:
             raise InputError(f"method '{spec.name}' takes no 'start', the forces to begin with.")
         more = {"start": before.pop()} if warm else {}
         more |= {"time_limit": limit} if "time_limit" in passed else {}
-        answer = _read(make(problem, **{**passed, **spec.settings, **more}), spec.label)
+        answer = _read(make(problem, **{**passed, **spec.settings, **more}), spec)
         before[:] = [answer.reactions]
         return answer
 
     return read
 
 
-def _read(answer: object, label: str) -> Answer:
+def _read(answer: object, spec: MethodSpec) -> Answer:
     """What a plug-in's function returned, in whatever form."""
-    if isinstance(answer, PeerAnswer):
-        return replace(answer, label=label)
+    label = spec.label
     if isinstance(answer, Answer):
-        return replace(answer, label=label, measured={})
+        own = isinstance(answer, PeerAnswer) and spec.peer  # a peer that it declared
+        return replace(answer, label=label, measured=answer.measured if own else {})
     if isinstance(answer, Solution):
         return _of_solution(answer, label)
     reactions, multipliers = answer if isinstance(answer, tuple) else (answer, None)
@@ -266,27 +280,30 @@ def _of_solution(s: Solution, label: str, seconds: float = np.nan) -> Answer:
     return Answer(s.status.label, s.message, *forces, label, s.iterations, seconds, s.history)
 
 
-def _in_form(answer: Answer, problem: InterfaceProblem | States, seconds: float) -> Answer:
-    """The answer in its one form; TypeError or ValueError if it has another."""
-    r = _real(answer.reactions)
-    lam = None if answer.multipliers is None else _real(answer.multipliers)
-    if r.size != problem.q.size:
+def _in_form(
+    answer: Answer, problem: InterfaceProblem | States, measured: dict[str, float]
+) -> Answer:
+    """The answer in its one form, of plain numbers and words; an error if it has another."""
+    r, lam = (None if x is None else _real(x) for x in (answer.reactions, answer.multipliers))
+    if r is not None and r.size != problem.q.size:
         raise ValueError(
             f"reactions must have shape {problem.q.shape}, normal first; got {r.shape}"
         )
     if lam is not None and lam.shape != problem.s.shape:
         raise ValueError(f"multipliers must have shape {problem.s.shape}; got {lam.shape}")
-    if answer.status not in STATUSES:
-        raise ValueError(f"{answer.status!r} is no status")
+    status = SAID.get(answer.status)
+    if status is None or (r is None and status == Status.SOLVED.label):
+        raise ValueError(f"{answer.status!r} is no status that a method may give here")
     return Answer(
-        answer.status,
-        answer.message,
-        r.reshape(problem.q.shape),
+        status,
+        one_line(answer.message),
+        None if r is None else r.reshape(problem.q.shape),
         lam,
         str(answer.label),
         float(answer.iterations),
-        seconds if np.isnan(answer.seconds) else float(answer.seconds),
+        measured["call_seconds"] if np.isnan(answer.seconds) else float(answer.seconds),
         _thinned(answer.history),
+        measured,
     )
 
 
@@ -337,11 +354,14 @@ def _memory(field: str) -> float:
 
 
 def _limit_memory(gigabytes: float) -> None:
-    """Bound the data of this process, and all that is mapped beyond what it holds now."""
+    """Bound the data of this process, all that is mapped beyond what it holds now, and each file
+    that it writes.
+    """
     import psutil
 
     size = int(gigabytes * 1e9)
-    limits = {resource.RLIMIT_DATA: size, resource.RLIMIT_CORE: 0}
+    limits = dict.fromkeys((resource.RLIMIT_DATA, resource.RLIMIT_FSIZE), size)
+    limits[resource.RLIMIT_CORE] = 0
     limits[resource.RLIMIT_AS] = psutil.Process().memory_info().vms + size
     for kind, limit in limits.items():
         with suppress(OSError, ValueError):
