@@ -167,6 +167,13 @@ def rim(cells: np.ndarray) -> np.ndarray:
     return np.asarray(known[:, count == 1])
 
 
+def alone(corners: np.ndarray) -> np.ndarray:
+    """Numbers of the rows of `corners` (m, c) that no other row repeats, in whatever order."""
+    rows = np.sort(corners, axis=1)
+    _, first, count = np.unique(rows, axis=0, return_index=True, return_counts=True)
+    return np.sort(first[count == 1])
+
+
 def facets_at(mesh: skfem.Mesh, corners: np.ndarray) -> np.ndarray:
     """Numbers (m,) of the facets with these corners (c, m), in whatever order; -1 where there is
     none. A sum of random numbers, one for each node, stands for the corners.
