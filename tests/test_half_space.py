@@ -42,6 +42,7 @@ def ticks(n, length=10.0):
 
 def ball(n=20, law="coulomb", mu=0.3, shear=0.4, m=None, lower=STEEL, upper=None, **changes):
     """A paraboloid pressed on a square of n x m points and sheared."""
+    mu = 0.0 if law == "frictionless" else mu
     points = (ticks(n), ticks(m or n, 10.0 * (m or n) / n))
     force = {"z": -3.0} | ({"x": shear} if shear else {})
     above = Rigid("ball", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20, force=force)
