@@ -275,15 +275,14 @@ def _normals(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _sides(mesh: Mesh) -> Iterator[tuple[str, dict[str, Any]]]:
     """The nodes of each named boundary, in space the triangles between them, and no arrows."""
     kind, faces = surface(*elements_of(mesh), _spatial(mesh.doflocs))
-    solid = len(mesh.p) == 3
-    number = facets_at(mesh, faces[:, : CORNERS[kind]].T) if solid else None
     for name, side in (mesh.boundaries or {}).items():
         facets = np.asarray(side)
         nodes, place = facet_nodes(mesh, facets), np.zeros(mesh.doflocs.shape[1], dtype=int)
         place[nodes] = np.arange(len(nodes))
         cells = np.zeros((0, 3), dtype=int)
-        if solid:
-            cells = place[triangles(pieces(kind, faces[np.isin(number, facets)]))]
+        if len(mesh.p) == 3:
+            shown = np.isin(facets_at(mesh, faces[:, : CORNERS[kind]].T), facets)
+            cells = place[triangles(pieces(kind, faces[shown]))]
         places = _spatial(mesh.doflocs[:, nodes])
         marked, vector = _spread(places, SYMBOLS), np.zeros(places.shape)
         yield name, {"places": places, "cells": cells, "vector": vector, "marked": marked}
