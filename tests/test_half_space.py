@@ -18,6 +18,7 @@ from contactopt import (
     natural_map_residual,
     scenes,
 )
+from contactopt.bodies.half_space import HalfSpaceBody
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.linear.convolution import Convolution
@@ -384,13 +385,22 @@ def test_local_maxima_on_a_grid_are_those_among_the_nearest_contacts():
 def test_a_fit_in_a_window_of_the_grid_is_that_among_all_contacts(width, monkeypatch):
     reduction = reduce_bodies(ball(31, law="frictionless", shear=0))
     solution = contactopt.solve(reduction.problem)
-    found = []
+    found, near = [], []
     for window in (width, 31):
         monkeypatch.setattr(peaks, "WINDOW", window)
         found.append(peaks.pressure_reading(reduction, solution))
+        near.append([peaks.around(reduction.problem, contact) for contact in (0, 17, 480)])
+    np.testing.assert_array_equal(*near)
     assert (found[0].value, found[0].uncertainty) == (found[1].value, found[1].uncertainty)
     for one, other in zip(*(reading.peaks for reading in found)):
         np.testing.assert_array_equal(one.sources, other.sources)
+
+
+def test_the_surface_is_made_once(monkeypatch):
+    made, make = [], HalfSpaceBody.surface
+    monkeypatch.setattr(HalfSpaceBody, "surface", lambda *given: made.append(0) or make(*given))
+    contactopt.reduce(ball(12))
+    assert len(made) == 1
 
 
 def test_the_phases_of_a_run_sum_to_its_total(tmp_path):

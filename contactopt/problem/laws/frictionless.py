@@ -24,6 +24,9 @@ class Frictionless(Law):
     def idle(self, y: np.ndarray) -> np.ndarray:
         return np.asarray(y[:, 0] <= 0)
 
+    def sticking(self, r: np.ndarray) -> np.ndarray:
+        return np.zeros(len(r), dtype=bool)
+
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.zeros(len(r_n))
 
