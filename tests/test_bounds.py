@@ -12,8 +12,8 @@ from contactopt.bounds import bounded
 from contactopt.bounds.bound import Bound
 from contactopt.bounds.displaced_stress import halved
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
-from contactopt.bounds.facing_facets import measures
 from contactopt.bounds.interval import interval
+from contactopt.meshes.cells import measures
 from contactopt.meshes.mesh_refinement import split
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene

@@ -11,7 +11,7 @@ from contactopt import Material
 from contactopt.bounds.bound import Bound
 from contactopt.bounds.displaced_stress import halved
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
-from contactopt.bounds.facing_facets import facet_rule, measures
+from contactopt.bounds.facing_facets import facet_rule
 from contactopt.bounds.nearest_tractions import BalancedMoments, ForceResponse
 from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.bounds.uneven_traction import (
@@ -21,6 +21,7 @@ from contactopt.bounds.uneven_traction import (
     uneven_squares,
 )
 from contactopt.bounds.vertex_balance import Balance
+from contactopt.meshes.cells import measures
 from contactopt.solving.solve_scene import solve_scene
 from experiments.questions.bounds import compatible, composite
 from tests.test_bounds import (

@@ -24,7 +24,7 @@ from contactopt.bodies.elements import (
 from contactopt.checks import place_words
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
-from contactopt.meshes.cells import CURVED, SHAPES
+from contactopt.meshes.cells import CURVED, SHAPES, facets_at
 
 # (dimension, nodes of a facet) -> element behind it, corners of the facet
 KINDS = {
@@ -161,8 +161,7 @@ def bare_surface(
         t = np.concatenate([ends, count + np.arange(len(facets))[:, None]], axis=1).T
     plain = SHAPES[kind][0](np.concatenate([x, behind], axis=1), np.ascontiguousarray(t))
     mesh = plain if degree == 1 else _curved(plain, kind, points, facets, corners)
-    lookup = {tuple(row): i for i, row in enumerate(np.sort(plain.facets, axis=0).T.tolist())}
-    boundary = np.array([lookup[tuple(row)] for row in np.sort(ends, axis=1).tolist()])
+    boundary = facets_at(plain, ends.T)
     basis = make_basis(mesh, degree, weight[1])
     copied = copies(basis, degree, boundary, mesh, None)
     trace = contact_trace(basis, degree, boundary, weight, every, copied)

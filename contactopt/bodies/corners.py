@@ -23,7 +23,7 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.elements import FACES, Faces, nodes_on
-from contactopt.meshes.cells import joined
+from contactopt.meshes.cells import joined, sides_of
 from contactopt.meshes.curves import CORNER, KINK, LARGEST
 from contactopt.meshes.given_curves import Curve
 
@@ -78,7 +78,7 @@ def copies(
 def _joints(mesh: skfem.Mesh, boundary: np.ndarray, ends: np.ndarray) -> _Joints:
     """Those of facets (f,) of the surface with corners `ends` (c, f)."""
     count, facets = ends.shape
-    side = _sides(ends)
+    side = sides_of(ends)
     keys = np.sort(side, axis=0).reshape(len(side), -1)
     order = np.lexsort(keys)
     same = np.all(keys[:, order[1:]] == keys[:, order[:-1]], axis=0)
@@ -94,11 +94,6 @@ def _joints(mesh: skfem.Mesh, boundary: np.ndarray, ends: np.ndarray) -> _Joints
     beyond = centre[:, facet[1]] - mesh.p[:, keys[0, pair[0]]]
     sign = np.where(np.sum(beyond * n[:, 0], axis=0) > 0, -1.0, 1.0)
     return _Joints(facet, pair // facets, sign * np.arccos(cosine))
-
-
-def _sides(ends: np.ndarray) -> np.ndarray:
-    """(ends of a side, c, f) nodes of the sides of facets: each corner, or each edge from it on."""
-    return ends[None] if len(ends) == 2 else np.stack([ends, np.roll(ends, -1, axis=0)])
 
 
 def _is_corner(p: np.ndarray, ends: np.ndarray, joints: _Joints) -> np.ndarray:
@@ -125,7 +120,7 @@ def _beside(p: np.ndarray, ends: np.ndarray, joints: _Joints, tried: np.ndarray)
     count, facets = ends.shape
     number = np.full((count, facets), -1)  # the joint at each side of each facet
     number[joints.sides, joints.facets] = np.arange(len(joints.turn))
-    side = _sides(ends)
+    side = sides_of(ends)
     own = side[:, joints.sides[:, tried], joints.facets[:, tried]]  # (ends, 2, t)
     near = joints.facets[:, tried][None]  # the facets whose sides are looked at
     if count == 3:
@@ -151,7 +146,7 @@ def _bent(
     p: np.ndarray, ends: np.ndarray, joints: _Joints, some: np.ndarray, curve: Curve
 ) -> np.ndarray:
     """Whether a given curve turns at some joints (t,): its directions into both facets differ."""
-    side = _sides(ends)[:, joints.sides[0, some], joints.facets[0, some]]
+    side = sides_of(ends)[:, joints.sides[0, some], joints.facets[0, some]]
     x = p[:, side].mean(axis=1)
     directions = []
     for facet in joints.facets[:, some]:

@@ -14,6 +14,8 @@ import numpy as np
 import skfem
 from scipy.spatial import KDTree
 
+from contactopt.meshes.cells import area_vectors, outer_corners
+
 # thickness over the length of a facet: at .2 a layer of quadratic triangles has the stresses of one
 # of quadrilaterals, at .1 half as much again (tests/test_thin_layers.py)
 THIN = 0.25
@@ -45,14 +47,7 @@ def thin_facets(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
 
 def _measured(mesh: skfem.Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middles (dim, f), outward unit normals (dim, f) and longest edges (f,) of boundary facets."""
-    x = mesh.p[:, mesh.facets[:, facets]]  # (dim, v, f)
-    edges = np.roll(x, 1, axis=1) - x
-    size = np.linalg.norm(edges, axis=0).max(axis=0)
-    middle = x.mean(axis=1)
-    if len(x) == 2:
-        normal = np.stack([edges[1, 0], -edges[0, 0]])
-    else:
-        normal = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0], axis=0)
-    normal = normal / np.linalg.norm(normal, axis=0)
-    inside = mesh.p[:, mesh.t[:, mesh.f2t[0, facets]]].mean(axis=1)
-    return middle, normal * np.sign(np.sum((middle - inside) * normal, axis=0)), size
+    x = mesh.p[:, outer_corners(mesh, facets)]  # (dim, v, f)
+    size = np.linalg.norm(np.roll(x, 1, axis=1) - x, axis=0).max(axis=0)
+    normal = area_vectors(x)
+    return x.mean(axis=1), normal / np.linalg.norm(normal, axis=0), size

@@ -8,6 +8,7 @@ import numpy as np
 from skfem import Mesh, MeshTri
 
 from contactopt.material import Material, lame
+from contactopt.meshes.cells import facets_at
 
 if TYPE_CHECKING:
     from contactopt.bounds.equilibrium_elements import EquilibriumElements
@@ -32,12 +33,8 @@ def halved(mesh: Mesh) -> Halves:
     """Cut a mesh of quadrilaterals."""
     t = np.concatenate([mesh.t[[0, 1, 3]], mesh.t[[1, 2, 3]]], axis=1)
     made = MeshTri(mesh.p, t)
-    edges = {tuple(own): i for i, own in enumerate(np.sort(made.facets, axis=0).T.tolist())}
     named = {
-        name: np.array(
-            [edges[tuple(own)] for own in np.sort(mesh.facets[:, at], axis=0).T.tolist()]
-        )
-        for name, at in (mesh.boundaries or {}).items()
+        name: facets_at(made, mesh.facets[:, at]) for name, at in (mesh.boundaries or {}).items()
     }
     return Halves(made.with_boundaries(named), np.tile(mesh.t, 2))
 

@@ -19,6 +19,7 @@ from contactopt.coupling.facing import Facets, facing_pairs
 from contactopt.coupling.segments import areas, clip
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
+from contactopt.meshes.cells import measures
 from contactopt.problem.laws import find_law
 from contactopt.scenes.scene import Part
 from contactopt.solving.solve_scene import Solved
@@ -264,13 +265,6 @@ def _shares(corners: np.ndarray, x: np.ndarray) -> np.ndarray:
     edges = corners[:, 1:] - corners[:, :1]
     others = np.moveaxis((x - corners[:, :1]) @ np.linalg.inv(edges), 2, 0)
     return np.concatenate([1 - others.sum(axis=0, keepdims=True), others])
-
-
-def measures(points: np.ndarray) -> np.ndarray:
-    """Lengths or areas (f,) of simplices with vertices (dim, v, f)."""
-    edges = points[:, 1:] - points[:, :1]
-    gram = np.einsum("dav,dbv->vab", edges, edges)
-    return np.asarray(np.sqrt(np.linalg.det(gram)) / (1 if points.shape[1] == 2 else 2))
 
 
 def _side(

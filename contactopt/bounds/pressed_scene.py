@@ -18,7 +18,6 @@ from contactopt.bounds.facing_facets import (
     FacingFacets,
     control_points,
     facet_nodes,
-    measures,
     quadratic_shapes,
 )
 from contactopt.bounds.nearest_tractions import ForceResponse
@@ -26,7 +25,7 @@ from contactopt.bounds.simplices import Simplices
 from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.defaults import CLOSE
 from contactopt.errors import InputError
-from contactopt.meshes.cells import is_curved
+from contactopt.meshes.cells import is_curved, measures
 from contactopt.scenes.loads.load import Uniform
 from contactopt.solving.solve_scene import Solved
 

@@ -44,11 +44,12 @@ import numpy as np
 import skfem
 
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
-from contactopt.bounds.facing_facets import FacingFacets, measures
+from contactopt.bounds.facing_facets import FacingFacets
 from contactopt.bounds.tetrahedra import Tetrahedra
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.material import Material
+from contactopt.meshes.cells import facets_at, measures
 
 if TYPE_CHECKING:
     from contactopt.bounds.pressed_scene import PressedScene
@@ -174,8 +175,7 @@ def _fans(corners: np.ndarray, fan: np.ndarray, rest: np.ndarray) -> tuple[Any, 
         number[:, e] = len(points) - 2, len(points) - 1, tip
     mesh = skfem.MeshTri(np.array(points).T, number)
     m = np.zeros((mesh.facets.shape[1], 2, 2))
-    edge = {tuple(own): i for i, own in enumerate(np.sort(mesh.facets, axis=0).T.tolist())}
-    facets = np.array([edge[tuple(own)] for own in np.sort(number[:2], axis=0).T.tolist()])
+    facets = facets_at(mesh, number[:2])
     length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
     own = length[:, None, None] / 6 * (rest + rest.sum(axis=1, keepdims=True))
     place = mesh.facets[:, facets] == number[1]  # which of the facet's vertices is the second one

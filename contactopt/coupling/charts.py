@@ -6,6 +6,7 @@ import numpy as np
 
 from contactopt.coupling.planes_of_symmetry import ContactPoints, SymmetryPlane, symmetry_planes
 from contactopt.defaults import CLOSE, EQUAL
+from contactopt.meshes.cells import rim, sides_of
 from contactopt.problem.chart import Chart
 
 FLAT = 0.1  # a mean normal shorter than this belongs to a surface that closes on itself
@@ -160,11 +161,10 @@ def _spread(contacts: ContactPoints, n: np.ndarray) -> np.ndarray:
 
 def _rim_direction(contacts: ContactPoints) -> np.ndarray:
     """Along the longest edge of the rim, whose edges belong to one cell only."""
-    corners = contacts.cells
-    edges = np.concatenate([corners[[i, i - 1]] for i in range(len(corners))], axis=1)
-    known, count = np.unique(np.sort(edges, axis=0), axis=1, return_counts=True)
-    rim = known[:, count == 1] if np.any(count == 1) else known
-    chords = contacts.points[:, rim[1]] - contacts.points[:, rim[0]]
+    edges = rim(contacts.cells)
+    if not edges.size:  # the surface closes on itself
+        edges = np.unique(np.sort(sides_of(contacts.cells).reshape(2, -1), axis=0), axis=1)
+    chords = contacts.points[:, edges[1]] - contacts.points[:, edges[0]]
     length = np.linalg.norm(chords, axis=0)
     return np.asarray(chords[:, np.argmax(length >= length.max() * (1 - EQUAL))])
 

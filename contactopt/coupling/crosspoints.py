@@ -46,7 +46,7 @@ from scipy.spatial import KDTree
 
 from contactopt.bodies.assembled import AssembledBody
 from contactopt.coupling.coupling import Coupling
-from contactopt.meshes.cells import joined
+from contactopt.meshes.cells import joined, rim
 from contactopt.scenes.contact import Contact
 
 _Node: TypeAlias = tuple[str, int]  # a body and the first unknown of one of its nodes
@@ -158,13 +158,9 @@ class _Seam:
     @cached_property
     def edge(self) -> np.ndarray:
         """(k,) whether contacts are at the edge of the surface."""
-        cells, k = self.made.cells, len(self.made.gap)
-        sides = cells[None] if len(cells) == 2 else np.stack([cells, np.roll(cells, -1, axis=0)])
-        sides = np.sort(sides.reshape(len(sides), -1), axis=0)
-        known, count = np.unique(sides, axis=1, return_counts=True)
-        found = np.ones(k, dtype=bool)
-        found[cells] = False
-        found[known[:, count == 1]] = True
+        found = np.ones(len(self.made.gap), dtype=bool)
+        found[self.made.cells] = False
+        found[rim(self.made.cells)] = True
         return found
 
     def holds(self, kept: np.ndarray) -> bool:

@@ -27,7 +27,6 @@ Wriggers, Wagner (eds), Nonlinear Computational Mechanics, Springer, 690-702.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -35,6 +34,7 @@ import scipy.sparse as sp
 
 from contactopt.bodies.assembled import Mesh, Surface
 from contactopt.defaults import EQUAL
+from contactopt.meshes.cells import rim
 from contactopt.scenes.contact import SIDES
 
 if TYPE_CHECKING:
@@ -137,15 +137,7 @@ class _Side:
     def ends(self) -> np.ndarray:
         """(s,) nodes on an edge of one face only, and those of faces that are covered in part."""
         ends = self.beside()
-        corners = self.mesh.faces[:, : CORNERS[self.mesh.kind]]
-        if corners.shape[1] == 2:
-            nodes, count = np.unique(corners, return_counts=True)
-            ends[nodes[count == 1]] = True
-        else:
-            around = [*pairwise(corners.T), (corners[:, -1], corners[:, 0])]
-            edges = np.sort(np.concatenate([np.stack(edge) for edge in around], axis=1), axis=0)
-            known, count = np.unique(edges, axis=1, return_counts=True)
-            ends[known[:, count == 1]] = True
+        ends[rim(self.mesh.faces[:, : CORNERS[self.mesh.kind]].T)] = True
         return ends
 
     def beside(self) -> np.ndarray:

@@ -22,7 +22,7 @@ from contactopt.figures.html import filled, packed, remark_list, write_html
 from contactopt.figures.page_data import MOST_INSIDE, body_arrays, box_of, whole_box
 from contactopt.figures.pieces import CORNERS, pieces, surface, triangles
 from contactopt.figures.scene_check import SceneCheck
-from contactopt.meshes.cells import elements_of, facet_nodes
+from contactopt.meshes.cells import elements_of, facet_nodes, facets_at
 from contactopt.readings.resultants import mirrors
 from contactopt.scenes.kinds import KINDS
 from contactopt.scenes.scene import Part, Scene, Support
@@ -281,18 +281,11 @@ def _sides(mesh: Mesh) -> Iterator[tuple[str, dict[str, Any]]]:
         place[nodes] = np.arange(len(nodes))
         cells = np.zeros((0, 3), dtype=int)
         if len(mesh.p) == 3:
-            cells = place[triangles(pieces(kind, _faces_on(mesh, facets, kind, faces)))]
+            shown = np.isin(facets_at(mesh, faces[:, : CORNERS[kind]].T), facets)
+            cells = place[triangles(pieces(kind, faces[shown]))]
         places = _spatial(mesh.doflocs[:, nodes])
         marked, vector = _spread(places, SYMBOLS), np.zeros(places.shape)
         yield name, {"places": places, "cells": cells, "vector": vector, "marked": marked}
-
-
-def _faces_on(mesh: Mesh, facets: np.ndarray, kind: str, faces: np.ndarray) -> np.ndarray:
-    """The faces of the surface of a solid (m, v) that are among some facets of its mesh."""
-    shown, corners = np.sort(faces[:, : CORNERS[kind]], axis=1), mesh.facets[:, facets]
-    wanted = np.sort(corners.T, axis=1)
-    number = np.unique(np.concatenate([shown, wanted]), axis=0, return_inverse=True)[1].ravel()
-    return faces[np.isin(number[: len(shown)], number[len(shown) :])]
 
 
 def _packed(item: dict[str, Any], dim: int) -> dict[str, Any]:

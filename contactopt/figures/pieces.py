@@ -7,7 +7,7 @@ drawn as pieces between all of its nodes, and its edges as lines through the nod
 
 import numpy as np
 
-from contactopt.meshes.cells import mirrored
+from contactopt.meshes.cells import alone, mirrored
 
 # nodes of the faces of a solid element, each face numbered as a plane element, seen from outside
 FACES = {
@@ -61,8 +61,8 @@ def surface(kind: str, elements: np.ndarray, points: np.ndarray) -> tuple[str, n
         return kind, elements
     faces = np.concatenate([elements[:, list(face)] for face in FACES[kind]])
     plane = PLANE[kind]
-    alone = _alone(faces[:, : CORNERS[plane]])
-    owners, faces = elements[alone % len(elements)], faces[alone]
+    outer = alone(faces[:, : CORNERS[plane]])
+    owners, faces = elements[outer % len(elements)], faces[outer]
     corners = points[faces[:, : CORNERS[plane]]]
     outward = corners.mean(axis=1) - points[owners].mean(axis=1)
     inside_out = np.sum(_normals(corners) * outward, axis=1) < 0
@@ -98,7 +98,7 @@ def mesh_lines(kind: str, elements: np.ndarray) -> np.ndarray:
 def outline(kind: str, elements: np.ndarray) -> np.ndarray:
     """As mesh_lines, those edges that belong to one element only."""
     edges = _edges(kind, elements)
-    return np.asarray(edges[_alone(edges[:, [0, -1]])])
+    return np.asarray(edges[alone(edges[:, [0, -1]])])
 
 
 def sharp_edges(kind: str, elements: np.ndarray, points: np.ndarray, cosine: float) -> np.ndarray:
@@ -127,11 +127,3 @@ def _edges(kind: str, elements: np.ndarray) -> np.ndarray:
 def _normals(corners: np.ndarray) -> np.ndarray:
     """Normals (m, 3) of plane elements with corners (m, c, 3), of no particular length."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
-
-
-def _alone(corners: np.ndarray) -> np.ndarray:
-    """Rows of `corners` (m, c) that no other row repeats, in whatever order."""
-    _, first, count = np.unique(
-        np.sort(corners, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    return np.sort(first[count == 1])

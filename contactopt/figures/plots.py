@@ -7,7 +7,6 @@ do not.
 
 from __future__ import annotations
 
-from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from contactopt.figures.path_plots import energies, loop, path_figure
 from contactopt.figures.pieces import triangles
 from contactopt.figures.style import (
     BLUE,
-    COLOURS,
     GREY,
     LETTERS,
     MARK,
@@ -42,7 +40,7 @@ if TYPE_CHECKING:
     from contactopt.accuracy.estimate import Estimate
 
 __all__ = [
-    "contact_figure", "contact_line", "contact_place", "convergence", "deformed", "energies",
+    "contact_figure", "contact_line", "contact_place", "deformed", "energies",
     "loop", "maps_figure", "path_figure", "pressure", "refinement_figure",
     "stick_map", "traction",
 ]  # fmt: skip
@@ -300,17 +298,6 @@ def maps_figure(reduction: Reduction, solution: Solution) -> Any:
     for ax in axes[len(panels) :]:
         ax.set_axis_off()
     return figure
-
-
-def convergence(solutions: dict[str, Solution], ax: Axes | None = None) -> Any:
-    """Natural-map residual against outer iterations, one line per solve."""
-    ax = make_axes(ax)
-    for colour, (label, solution) in zip(cycle(COLOURS), solutions.items()):
-        residual = [h["residual"] for h in solution.history]
-        ax.semilogy(range(1, len(residual) + 1), residual, "o-", color=colour, label=label)
-    ax.set(xlabel="outer iteration [-]", ylabel="natural-map residual [-]")
-    add_legend(ax)
-    return ax
 
 
 def refinement_figure(estimate: Estimate) -> Any:

@@ -152,6 +152,53 @@ def outer_corners(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
     return np.asarray(nodes)
 
 
+def sides_of(cells: np.ndarray) -> np.ndarray:
+    """(ends of a side, v, c) nodes of the sides of lines, triangles and quadrilaterals (v, c): each
+    corner, or each edge from it on.
+    """
+    return cells[None] if len(cells) == 2 else np.stack([cells, np.roll(cells, -1, axis=0)])
+
+
+def rim(cells: np.ndarray) -> np.ndarray:
+    """Ends (1 or 2, m), in ascending order, of the sides that one of the cells (v, c) alone has."""
+    sides = sides_of(cells)
+    sides = np.sort(sides.reshape(len(sides), -1), axis=0)
+    known, count = np.unique(sides, axis=1, return_counts=True)
+    return np.asarray(known[:, count == 1])
+
+
+def alone(corners: np.ndarray) -> np.ndarray:
+    """Numbers of the rows of `corners` (m, c) that no other row repeats, in whatever order."""
+    rows = np.sort(corners, axis=1)
+    _, first, count = np.unique(rows, axis=0, return_index=True, return_counts=True)
+    return np.sort(first[count == 1])
+
+
+def facets_at(mesh: skfem.Mesh, corners: np.ndarray) -> np.ndarray:
+    """Numbers (m,) of the facets with these corners (c, m), in whatever order; -1 where there is
+    none. A sum of random numbers, one for each node, stands for the corners.
+    """
+    drawn = np.random.default_rng(0).integers(0, 2**63, mesh.p.shape[1] + 1, dtype=np.uint64)
+    known, wanted = drawn[mesh.facets].sum(axis=0), drawn[corners].sum(axis=0)
+    order = np.argsort(known)
+    found = order[np.searchsorted(known, wanted, sorter=order).clip(max=len(order) - 1)]
+    return np.where(known[found] == wanted, found, -1)
+
+
+def in_triangles(nodes: np.ndarray) -> np.ndarray:
+    """Corners of lines and triangles as they are, those (4, c) of quadrilaterals cut in two."""
+    if len(nodes) < 4:
+        return nodes
+    return np.concatenate([nodes[[0, 1, 2]], nodes[[0, 2, 3]]], axis=1)
+
+
+def measures(corners: np.ndarray) -> np.ndarray:
+    """Lengths or areas (c,) of lines or triangles with corners (dim, v, c)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    gram = np.einsum("dac,dbc->cab", edges, edges)
+    return np.asarray(np.sqrt(np.linalg.det(gram)) / (corners.shape[1] - 1))
+
+
 def area_vectors(corners: np.ndarray) -> np.ndarray:
     """Area times normal (dim, f) of facets (dim, c, f) [length^2]; normals are right of edges."""
     if len(corners) == 2:

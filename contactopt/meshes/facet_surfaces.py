@@ -26,7 +26,14 @@ from skfem import Mesh
 
 from contactopt.defaults import EQUAL
 from contactopt.meshes.barycentric import barycentric, frames_of
-from contactopt.meshes.cells import area_vectors, is_curved, joined, outer_corners
+from contactopt.meshes.cells import (
+    area_vectors,
+    in_triangles,
+    is_curved,
+    joined,
+    outer_corners,
+    sides_of,
+)
 from contactopt.meshes.curves import CORNER, fitted_sphere, rounding, shares
 from contactopt.meshes.given_curves import Curve
 
@@ -168,8 +175,8 @@ def _triangles(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     facets = mesh.boundary_facets()
     nodes = outer_corners(mesh, facets)
     quads = len(nodes) == 4
-    tri = np.concatenate([nodes[[0, 1, 2]], nodes[[0, 2, 3]]], axis=1) if quads else nodes
-    ends = np.stack([tri, np.roll(tri, -1, axis=0)])
+    tri = in_triangles(nodes)
+    ends = sides_of(tri)
     middles = mesh.p[:, ends].mean(axis=1)
     if is_curved(mesh):
         size = mesh.nvertices
@@ -188,7 +195,7 @@ def _triangles(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _neighbours(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Triangles (2, m) that share an edge, and which of the edges 01, 12, 20 it is of each."""
     count = nodes.shape[1]
-    ends = np.sort(np.stack([nodes, np.roll(nodes, -1, axis=0)]), axis=0).reshape(2, -1)
+    ends = np.sort(sides_of(nodes), axis=0).reshape(2, -1)
     order = np.lexsort(ends)
     same = np.all(ends[:, order[1:]] == ends[:, order[:-1]], axis=0)
     first, second = order[:-1][same], order[1:][same]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from contactopt.meshes.cells import alone
 from contactopt.meshes.inp_text import LARGEST, Block, set_of
 
 if TYPE_CHECKING:
@@ -141,7 +142,5 @@ def _free(sides: list[np.ndarray]) -> list[np.ndarray]:
     made = []
     for width in {own.shape[1] for own in sides}:
         corners = np.concatenate([own for own in sides if own.shape[1] == width])
-        keys = np.sort(corners, axis=1)
-        _, place, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-        made.append(corners[count[place.ravel()] == 1])
+        made.append(corners[alone(corners)])
     return made

@@ -17,6 +17,7 @@ from contactopt.cards import count
 from contactopt.checks import LARGEST, check_number, overheard, place_words, remember
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
+from contactopt.meshes.cells import facets_at
 from contactopt.meshes.inp_elements import FACES
 from contactopt.meshes.mesh_formats import FileGroups, read_groups
 from contactopt.meshes.mesh_repair import (
@@ -256,23 +257,21 @@ def _boundaries(
 ) -> dict[str, np.ndarray]:
     """Name -> facets on the surface; `number` is the mesh's node for each of the file, or -1."""
     outer = mesh.boundary_facets()
-    corners = np.sort(mesh.facets[:, outer], axis=0)
-    place = {tuple(facet): i for i, facet in enumerate(corners.T.tolist())}
+    corners = mesh.facets[:, outer]
     found: dict[str, np.ndarray] = {}
     for name in groups.names(dim - 1):
-        hits, others = [], list[tuple[int, ...]]()
+        hits = np.zeros(0, dtype=int)
         for i, elements in groups.members[name, dim - 1].items():
             kind, nodes, _ = groups.blocks[i]
             many = 2 if dim == 2 else CORNERS.get(kind, nodes.shape[1])
-            facets = np.sort(number[nodes[elements][:, :many]], axis=1)
-            keys = [key for key in map(tuple, facets.tolist()) if key[0] >= 0]
-            hits += [place[key] for key in keys if key in place]
-            others += [key for key in keys if key not in place]
-        if others and (inside := len(_inner(mesh).intersection(others))):
+            hits = np.append(hits, facets_at(mesh, number[nodes[elements][:, :many]].T))
+        hits = np.unique(hits[hits >= 0])
+        inner = mesh.f2t[1, hits] >= 0
+        if inner.any():
             said = "no boundary of the body holds %s of %s, inside the body"
-            log.warning(said, count(inside, "facet"), name)
-        if hits:
-            found[name] = outer[np.unique(hits)]
+            log.warning(said, count(int(inner.sum()), "facet"), name)
+        if not inner.all():
+            found[name] = hits[~inner]
     skin = np.isin(np.arange(mesh.nvertices), corners)
     for name, nodes in groups.point_sets.items():
         own = number[nodes]  # those of other bodies are -1, those within edges come last
@@ -313,8 +312,3 @@ def _tell_others(path: Path, groups: FileGroups) -> None:
         if lost[dims]:
             said = "%s: %s off the sides and edges of all elements of bodies, left out"
             log.warning(said, path, count(lost[dims], what))
-
-
-def _inner(mesh: skfem.Mesh) -> set[tuple[int, ...]]:
-    """The corners of the facets between two elements."""
-    return set(map(tuple, np.sort(mesh.facets[:, mesh.f2t[1] >= 0], axis=0).T.tolist()))

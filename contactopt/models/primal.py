@@ -20,6 +20,7 @@ from contactopt.errors import InputError
 from contactopt.models.program import (
     Program,
     Reader,
+    answered,
     blockwise,
     columns,
     components,
@@ -38,8 +39,7 @@ def normal(problem: InterfaceProblem) -> Program:
     V_n lambda,  S_nn = Q_nn^-1.
     """
     u, lam, z, S, law, given, r_t = _normal(problem)
-    program = cp.Problem(cp.Minimize(cp.quad_form(z, S) / 2 - given @ lam), [u >= 0, law])
-    return _program(program, u, lam, {"r_t": r_t}, _reaction(S, z))
+    return _program(-given @ lam, [u >= 0, law], u, lam, {"r_t": r_t}, S, z)
 
 
 @stated
@@ -49,9 +49,8 @@ def penalised(problem: InterfaceProblem, stiffness: float = 1e3) -> Program:
     """
     u, lam, z, S, law, given, r_t = _normal(problem)
     kappa = cp.Parameter(nonneg=True, value=stiffness, name="kappa")
-    cost = cp.quad_form(z, S) / 2 - given @ lam + kappa * cp.sum_squares(cp.neg(u)) / 2
-    program = cp.Problem(cp.Minimize(cost), [law])
-    return _program(program, u, lam, {"r_t": r_t, "kappa": kappa}, _reaction(S, z))
+    work = -given @ lam + kappa * cp.sum_squares(cp.neg(u)) / 2
+    return _program(work, [law], u, lam, {"r_t": r_t, "kappa": kappa}, S, z)
 
 
 @stated
@@ -60,8 +59,7 @@ def bilateral(problem: InterfaceProblem) -> Program:
     lambda,  S_nn = Q_nn^-1.
     """
     u, lam, z, S, law, given, r_t = _normal(problem)
-    program = cp.Problem(cp.Minimize(cp.quad_form(z, S) / 2 - given @ lam), [u == 0, law])
-    return _program(program, u, lam, {"r_t": r_t}, _reaction(S, z))
+    return _program(-given @ lam, [u == 0, law], u, lam, {"r_t": r_t}, S, z)
 
 
 @stated
@@ -81,8 +79,8 @@ def tangential(problem: InterfaceProblem, facets: int | None = None) -> Program:
         parameters["approach"] = lam = cp.Parameter(int(plates.sum()), name="lambda")
         rest = rest + V[:, plates] @ lam
     S = _stiffness(problem.Q[np.ix_(t, t)])
-    cost = cp.quad_form(z, S) / 2 - problem.s[~plates] @ shift + g @ _slip(problem, u, facets)
-    program = cp.Problem(cp.Minimize(cost), [z == u - rest])
+    work = -problem.s[~plates] @ shift + g @ _slip(problem, u, facets)
+    program = cp.Problem(cp.Minimize(cp.quad_form(z, S) / 2 + work), [z == u - rest])
     return Program(program, {"u_t": u, "shift": shift}, parameters, _reaction(S, z))
 
 
@@ -93,12 +91,11 @@ def tresca(problem: InterfaceProblem, facets: int | None = None) -> Program:
     """
     u, u_n, u_t, lam, z, S, stretch = _all(problem)
     g = cp.Parameter(problem.contacts, nonneg=True, name="g")
-    cost = cp.quad_form(z, S) / 2 - problem.s @ lam + g @ _slip(problem, u_t, facets)
+    work = -problem.s @ lam + g @ _slip(problem, u_t, facets)
     apart = problem.law.lowest == 0
     contact = [u_n[np.flatnonzero(apart)] >= 0] if apart.any() else []
     closed = [u_n[np.flatnonzero(~apart)] == 0] if not apart.all() else []
-    program = cp.Problem(cp.Minimize(cost), [*contact, *closed, stretch])
-    return _program(program, u, lam, {"g": g}, _reaction(S, z))
+    return _program(work, [*contact, *closed, stretch], u, lam, {"g": g}, S, z)
 
 
 @stated
@@ -107,8 +104,7 @@ def associated(problem: InterfaceProblem, facets: int | None = None) -> Program:
     mu = cone_coefficient(problem)
     u, u_n, u_t, lam, z, S, stretch = _all(problem)
     opening = u_n >= cp.multiply(mu, _slip(problem, u_t, facets))
-    cost = cp.quad_form(z, S) / 2 - problem.s @ lam
-    return _program(cp.Problem(cp.Minimize(cost), [opening, stretch]), u, lam, {}, _reaction(S, z))
+    return _program(-problem.s @ lam, [opening, stretch], u, lam, {}, S, z)
 
 
 @stated
@@ -120,9 +116,7 @@ def acary_cadoux(problem: InterfaceProblem, facets: int | None = None) -> Progra
     u, u_n, u_t, lam, z, S, stretch = _all(problem)
     s = cp.Parameter(problem.contacts, nonneg=True, value=np.zeros(problem.contacts), name="s")
     opening = u_n + cp.multiply(mu, s) >= cp.multiply(mu, _slip(problem, u_t, facets))
-    cost = cp.quad_form(z, S) / 2 - problem.s @ lam
-    program = cp.Problem(cp.Minimize(cost), [opening, stretch])
-    return _program(program, u, lam, {"s": s}, _reaction(S, z))
+    return _program(-problem.s @ lam, [opening, stretch], u, lam, {"s": s}, S, z)
 
 
 def _normal(problem: InterfaceProblem) -> tuple[Any, ...]:
@@ -165,23 +159,19 @@ def _slip(problem: InterfaceProblem, u_t: object, facets: int | None) -> Any:
 
 
 def _reaction(S: cp.Expression, z: cp.Variable) -> dict[str, Reader]:
-    def read() -> np.ndarray:
-        if z.value is None:
-            raise InputError(
-                "the program has no answer yet: solve it before reading its multipliers."
-            )
-        return np.asarray(S.value @ z.value)
-
-    return {"reaction": read}
+    return {"reaction": lambda: np.asarray(S.value @ answered(z.value))}
 
 
 def _program(
-    problem: cp.Problem,
+    work: cp.Expression,
+    rules: list[cp.Constraint],
     u: cp.Variable,
     lam: cp.Variable,
     parameters: dict[str, Any],
-    readers: dict[str, Reader],
+    S: cp.Expression,
+    z: cp.Variable,
 ) -> Program:
-    """The program with its variables by name, lambda only where there are plates."""
+    """min z' S z / 2 + work subject to the rules, with lambda only where there are plates."""
+    program = cp.Problem(cp.Minimize(cp.quad_form(z, S) / 2 + work), rules)
     variables = {"u": u} | ({"lambda": lam} if lam.size else {})
-    return Program(problem, variables, parameters, readers)
+    return Program(program, variables, parameters, _reaction(S, z))

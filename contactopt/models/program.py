@@ -144,7 +144,11 @@ def matrix(Q: np.ndarray, name: str = "Q") -> Any:
 
 def dual(constraint: cp.Constraint, part: int | None = None) -> np.ndarray:
     """The multiplier of a constraint; InputError before a solve."""
-    value = constraint.dual_value if part is None else constraint.dual_value[part]
+    return answered(constraint.dual_value if part is None else constraint.dual_value[part])
+
+
+def answered(value: np.ndarray | None) -> np.ndarray:
+    """A value of a program; InputError before a solve."""
     if value is None:
         raise InputError("the program has no answer yet: solve it before reading its multipliers.")
     return np.asarray(value, dtype=float)

@@ -36,7 +36,7 @@ from skfem.refdom import RefLine, RefTri
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
 from contactopt.meshes.barycentric import barycentric, frames_of
-from contactopt.meshes.cells import is_curved, outer_corners
+from contactopt.meshes.cells import in_triangles, is_curved, measures, outer_corners
 from contactopt.meshes.mesh_refinement import boundary_curves
 from contactopt.problem import Solution
 
@@ -142,8 +142,7 @@ class Way:
         heights = np.linalg.norm(curve(middles) - middles, axis=0).reshape(nodes.shape)
         lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=0)
         angle = (8 * heights / lengths).max(axis=0)
-        if len(nodes) == 4:
-            nodes = np.concatenate([nodes[[0, 1, 2]], nodes[[0, 2, 3]]], axis=1)
+        nodes = in_triangles(nodes)
         self.corners, self.angle = mesh.p[:, nodes], np.resize(angle, nodes.shape[1])
         self.frames = frames_of(self.corners)
         self.curve, self.tree = curve, cKDTree(self.corners.mean(axis=1).T)
@@ -184,12 +183,9 @@ def _heights(coupling: Coupling, ways: list[Way | None]) -> np.ndarray:
         return np.zeros(count)
     if coupling.kind == "matching":
         return opened(coupling.positions, normals, coupling.gap)
-    cells = coupling.cells
-    if len(cells) == 4:
-        cells = np.concatenate([cells[[0, 1, 2]], cells[[0, 2, 3]]], axis=1)
+    cells = in_triangles(coupling.cells)
     corners = coupling.positions[:, cells]
-    edges = corners[:, 1:] - corners[:, :1]
-    size = np.sqrt(np.linalg.det(np.einsum("dac,dbc->cab", edges, edges)))
+    size = measures(corners)
     total, whole = np.zeros(count), np.zeros(count)
     inner, weights = get_quadrature(RefLine if len(cells) == 2 else RefTri, INSIDE)
     for share, weight in zip(np.vstack([1 - inner.sum(axis=0), inner]).T, weights):

@@ -12,7 +12,7 @@ from contactopt.bodies.views import elements_of
 from contactopt.coupling.back_to_bodies import Fields
 from contactopt.coupling.reduction import Reduction
 from contactopt.defaults import EQUAL
-from contactopt.meshes.cells import facet_nodes
+from contactopt.meshes.cells import area_vectors, facet_nodes
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.peaks import nodal_pressure
@@ -101,10 +101,7 @@ def _along(normals: np.ndarray, points: np.ndarray, cells: np.ndarray) -> np.nda
     """The cells (v, c), in space turned to go around the normals (k, dim) positively."""
     if len(points) < 3:
         return cells
-    x = points[:, cells]
-    area = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0], axis=0)
-    area += np.cross(x[:, 2] - x[:, 0], x[:, -1] - x[:, 0], axis=0)  # the other half of a quad
-    against = np.einsum("ic,vci->c", area, normals[cells]) < 0
+    against = np.einsum("ic,vci->c", area_vectors(points[:, cells]), normals[cells]) < 0
     return np.where(against, cells[::-1], cells)
 
 

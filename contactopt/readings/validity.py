@@ -15,6 +15,7 @@ from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
 from contactopt.defaults import TOL
 from contactopt.errors import InputError
+from contactopt.meshes.cells import measures
 from contactopt.problem import Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.plausibility import SHARE
@@ -59,8 +60,7 @@ def overlap_share(reduction: Reduction, solution: Solution) -> float:
 def _measures(places: np.ndarray, cells: np.ndarray, ring: bool) -> np.ndarray:
     """Lengths or areas (c,) of cells between places (dim, k), of rings those around the axis."""
     corners = places[:, cells]
-    edges = corners[:, 1:] - corners[:, :1]
-    size = np.sqrt(np.linalg.det(np.einsum("dac,dbc->cab", edges, edges)))
+    size = measures(corners)
     return np.asarray(size * np.abs(corners[0]).mean(axis=0) if ring else size)
 
 

@@ -32,7 +32,6 @@ from contactopt.bounds.bound import Bound
 from contactopt.bounds.composite_element import WEIGHT, reference_stress
 from contactopt.bounds.displaced_stress import bilinear, halved
 from contactopt.bounds.equilibrium_elements import EquilibriumElements
-from contactopt.bounds.facing_facets import measures
 from contactopt.bounds.interval import interval
 from contactopt.bounds.simplices import Simplices
 from contactopt.bounds.tetrahedra import Tetrahedra
@@ -40,6 +39,7 @@ from contactopt.bounds.uneven_traction import CONSTANT, regular_tetrahedron
 from contactopt.derivatives.interface import CERTIFIED
 from contactopt.errors import InputError
 from contactopt.figures.style import COLOURS, LETTERS, MARKS, add_legend, paper_axes
+from contactopt.meshes.cells import measures
 from contactopt.meshes.mesh_refinement import split
 from contactopt.methods.diagnosis import diagnose
 from contactopt.readings.quantities import find_quantity, value_of
