@@ -1,6 +1,4 @@
-"""A headless Chromium that opens a page, answers questions about it and takes pictures, over its
-debugging protocol.
-"""
+"""A headless Chromium that opens a page, answers questions about it and takes pictures."""
 
 import asyncio
 import base64

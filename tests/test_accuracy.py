@@ -47,9 +47,7 @@ def test_the_remainder_does_not_trust_luck():
 
 
 def test_no_functional_of_contact_is_believed_to_have_order_4():
-    """Energies of a blade in its slot on four meshes of degree 2. The last step is small by luck;
-    the limit is about 7.804.
-    """
+    """The last step of these energies is small by luck; the limit is about 7.804."""
     rest, order = mesh_error([8.198854, 8.480154, 7.820111, 7.815798], best_order("energy", 2))
     assert order is not None and order > 7
     assert 0.5 < everywhere.safety(4) * abs(rest) / (7.815798 - 7.804) < 4
@@ -57,9 +55,7 @@ def test_no_functional_of_contact_is_believed_to_have_order_4():
 
 
 def test_three_meshes_do_not_confirm_an_order_above_2():
-    """Energies of a pin in its lug on meshes of degree 2 fall with order 3 and pass the limit,
-    which is about 6.579. Two meshes show no order at all.
-    """
+    """These energies fall with order 3 and pass the limit, which is about 6.579."""
     values, best = [6.52629, 6.58031, 6.58651], best_order("energy", 2)
     rest, order = mesh_error(values, best)
     assert order is not None and order > 3
@@ -122,9 +118,7 @@ def test_the_peak_of_an_exact_ellipse_is_exact():
 
 
 def test_clapeyron():
-    """Without gap and loads but a plate's, the elastic energy is half the plate's work, which
-    friction shares.
-    """
+    """Without gap and loads but a plate's, the elastic energy is half the plate's work."""
     reduction = reduce_bodies(punch())
     solution = solve(reduction.problem, tol=1e-12)
     work = 100 * value_of("approach", reduction, solution)

@@ -1,6 +1,4 @@
-"""Local refinement for stresses: exact values are met, corners are recognised, bounds hold, the
-history is kept.
-"""
+"""Local refinement for stresses: exact values are met, corners are recognised, bounds hold."""
 
 import json
 from dataclasses import replace
@@ -37,12 +35,7 @@ def tube_stress(scene):
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_stress_at_a_bore_is_that_of_lame(degree):
-    """The bore is no contact and has no curve: its nodes lie on a circle, and new nodes are put on
-    it.
-
-    Estimates do not see that edges are chords of the circles: the errors are twice what was asked
-    for.
-    """
+    """Estimates do not see that edges are chords: the errors are twice what was asked for."""
     scene = make_scene("press-fit", degree=degree)
     _, estimate = locally(scene, "von_mises:shaft:inner", 1e-2)
     assert estimate.reached and estimate.value == pytest.approx(tube_stress(scene), rel=0.02)
@@ -136,9 +129,7 @@ def ball(size):
 
 
 def test_a_contact_smaller_than_the_elements_is_not_taken_for_resolved():
-    """One closed contact carries all of the force whatever the mesh of the body: only its pressure
-    betrays the error.
-    """
+    """One closed contact carries all of the force on any mesh: its pressure betrays the error."""
     scene, peak = ball(4.0)
     first = solve_scene(scene)
     asked = find_quantity("pressure", scene)

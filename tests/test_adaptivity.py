@@ -1,6 +1,4 @@
-"""Local refinement: meshes stay whole, curved boundaries curved; estimates agree with errors;
-unknowns go where they are needed.
-"""
+"""Local refinement: meshes stay whole, curved boundaries curved; estimates agree with errors."""
 
 from dataclasses import replace
 
@@ -113,9 +111,7 @@ def test_the_estimate_agrees_with_the_error(quantity):
 
 
 def test_unknowns_go_where_the_quantity_needs_them():
-    """For the peak pressure of Hertz the elements at the contact become small and the rest of the
-    mesh stays as it is.
-    """
+    """The elements at Hertz's contact become small, and the rest of the mesh stays as it is."""
     scene = make_scene("cylinder-2d", mu=0.0)
     solved, estimate = locally(scene, "pressure", 5e-3)
     assert estimate.reached and solved.solution.solved
@@ -192,9 +188,7 @@ def test_the_volume_between_facets_and_their_curve_is_known():
 
 
 def test_the_estimate_holds_what_a_polygon_lacks_of_a_circle():
-    """Halved where only the contact needs it, a heavy disc keeps its long chords and weighs less:
-    the estimate says so.
-    """
+    """A heavy disc that keeps its long chords weighs less: the estimate says so."""
     scene = loaded_disc(24)
     solved = solve_scene(scene)
     quantity = find_quantity("normal_force", solved.reduction.scene)

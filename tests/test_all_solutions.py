@@ -48,9 +48,7 @@ def test_one_triangle_loses_uniqueness_at_three_minus_four_nu(nu):
 
 @pytest.mark.parametrize("plate", [False, True])
 def test_the_list_is_complete(plate):
-    """Against all 64 combinations, with loads that make all contacts slip, at friction strong
-    enough for several.
-    """
+    """Against all 64 combinations, with loads that make all contacts slip."""
     counts = set()
     for seed in range(15):
         base = random_problem(seed, 4.0, plate)

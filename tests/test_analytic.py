@@ -265,9 +265,7 @@ def test_cycle_loss_is_the_area_of_the_loop(share):
 
 
 def test_cycle_loss_of_cylinders_is_the_work_of_friction():
-    """4 int mu p s dx with the slip s of the first loading, integrated from the strains of the two
-    surfaces.
-    """
+    """4 int mu p s dx with the slip s of the first loading."""
     share = 0.7
     first = line([share])
     a, c = first.half_width, first.stick_half_width

@@ -1,6 +1,4 @@
-"""Coulomb friction between dissimilar materials, against the half-space, limits and a contact
-algorithm.
-"""
+"""Coulomb friction between dissimilar materials, against the half-space."""
 
 import numpy as np
 import pytest
@@ -106,10 +104,7 @@ def test_punches_satisfy_the_half_space(mu, beta):
 
 @pytest.mark.parametrize("mu,beta", CASES)
 def test_round_bodies_satisfy_the_half_space(mu, beta):
-    """The surface takes the shape of the round body; the strain that a point had when it began to
-    stick stays: by
-    similarity u_x ~ x |x| there.
-    """
+    """The strain that a point had when it began to stick stays: u_x ~ x |x| there."""
     line, point = solutions(mu, beta, round_bodies=True)
     strain, stretch = [], []
     for share in (0.3, 0.6, 0.95, 1.1):

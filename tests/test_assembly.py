@@ -1,6 +1,4 @@
-"""Several bodies and several pairs of surfaces: statics, independence of pairs, results by surface,
-refused input.
-"""
+"""Several bodies and pairs: statics, independence of pairs, results by surface, refused input."""
 
 from dataclasses import replace
 
@@ -38,9 +36,7 @@ SOFT = Material(1000.0, 0.3)
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("cells", [(4,), (3, 4)], ids=["matching", "mortar"])
 def test_every_interface_of_a_stack_carries_what_rests_on_it(dim, form, cells):
-    """Three blocks of weight 4 (8 in 3D), pushed sideways: force and moment of every interface are
-    those of statics.
-    """
+    """Three blocks pushed sideways: force and moment of every interface are those of statics."""
     width, side = 2.0, 0.2
     scene = stack(3, dim, side=side, width=width, cells=cells)
     reduction = reduce_bodies(scene, Q=form)
@@ -68,9 +64,7 @@ def test_the_order_of_the_bodies_does_not_matter():
 
 
 def test_pairs_that_share_no_elastic_body_do_not_know_of_each_other():
-    """Two blocks side by side on one rigid floor: both as if alone, each with its own friction and
-    law.
-    """
+    """Two blocks on one rigid floor: both as if alone, each with its own friction and law."""
     loads = (Traction("top", (0.3, -1.0)),)
     parts = [
         Part(n, block([x, 0], [x + 1, 1], [4, 4]), SOFT, loads=loads, contact="bottom")
@@ -138,10 +132,7 @@ def test_many_bodies_have_a_sparse_q_that_grows_with_their_number():
 
 
 def test_a_wall_is_a_network():
-    """Two blocks carry a beam; a shared floor surface is elastic.
-
-    The beam's weight is shared out by symmetry.
-    """
+    """Two blocks carry a beam, whose weight is shared out by symmetry; the floor is elastic."""
     floor = Part(
         "floor", block([0, -1], [6, 0], [12, 2]), SOFT, (Support("bottom"),), contact="top"
     )
@@ -168,9 +159,7 @@ def test_a_wall_is_a_network():
 
 
 def test_forces_on_every_body_are_in_balance():
-    """Loads, pairs, supports and plates: force and moment, with a plate, a support, a traction and
-    friction.
-    """
+    """Loads, pairs, supports and plates: force and moment."""
     lower = Part("lower", block([0, -2], [3, 0], [6, 4]), SOFT, (Support("bottom"),), contact="top")
     middle = Part(
         "middle",

@@ -1,6 +1,4 @@
-"""The atlas of failure: every problem in it still defeats its method, each proof holds, and
-thresholds are predicted on problems that nobody has seen.
-"""
+"""Every problem of the atlas still defeats its method, and thresholds are predicted."""
 
 from dataclasses import replace
 
@@ -16,14 +14,7 @@ from experiments.questions.atlas.__main__ import WORDS, failures, report
 from experiments.questions.atlas.frontiers import MULTIPLIERS, crawl_ratio, nearly
 from experiments.questions.atlas.problems import FAILED, Case, run
 from experiments.questions.atlas.problems import draw as drawn
-from experiments.questions.atlas.radii import (
-    AROUND,
-    fails,
-    fresh,
-    newton_load,
-    pair,
-    penalty_error,
-)
+from experiments.questions.atlas.radii import AROUND, fails, fresh, newton_load, pair, penalty_error
 from experiments.questions.atlas.search import (
     CURES,
     KNOWN,

@@ -77,9 +77,7 @@ def test_a_backend_that_fails_is_a_status_that_names_it(monkeypatch, punch, answ
 
 
 def test_a_backend_that_lies_is_asked_again_and_then_reported(monkeypatch, punch):
-    """Whatever it claims, what comes back is checked against the problem: here a vector that no
-    crossover can save.
-    """
+    """What comes back is checked against the problem: here a vector that no crossover can save."""
     asked = []
     fake(monkeypatch, lambda p: asked.append(p) or np.full(len(p.q), 5.0))
     monkeypatch.setattr("contactopt.methods.kernels.semismooth.STEPS", 1)

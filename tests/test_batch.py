@@ -27,9 +27,7 @@ def test_every_answer_is_that_of_the_loop(dim, mu):
 
 
 def test_stragglers_are_solved_by_the_default(monkeypatch):
-    """Newton's method alone cycles on the first; the second has a singular step, and a third is
-    easy.
-    """
+    """Newton's method cycles on the first; the second has a singular step, the third is easy."""
     Q = np.array([[[2.0, -1.6], [-1.6, 2.0]], [[0.0, 0.0], [0.0, 0.0]], np.eye(2)])
     q = np.array([[[-10.0, 1.0]], [[1.0, 0.0]], [[-1.0, 0.2]]])
     monkeypatch.setattr(batch, "STEPS", 2)

@@ -1,6 +1,4 @@
-"""What can go wrong around a campaign: killed processes, full disks, bad plug-ins, strange names
-and numbers.
-"""
+"""What can go wrong around a campaign: killed processes, full disks, bad plug-ins."""
 
 import json
 import os
@@ -152,9 +150,7 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
 
 @pytest.mark.slow
 def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
-    """The first run of the method also costs its warm-up; those that follow cost their limit and a
-    start.
-    """
+    """The first run also costs its warm-up; those that follow cost their limit and a start."""
     name = f"hangs_{os.getpid()}"
     source = (
         f"import time\nfrom contactopt.benchmark import method\n@method\ndef {name}(problem,"
@@ -333,9 +329,7 @@ def test_answers_of_another_size_are_not_compared(tmp_path):
 
 @pytest.mark.slow
 def test_a_full_disk_is_one_sentence_and_loses_nothing(tmp_path):
-    """No file may grow beyond a size that ends within the rows; with room again the campaign goes
-    on.
-    """
+    """Files may not grow beyond the middle of the rows; with room again the campaign goes on."""
     path, out = written(tmp_path, SMALL.replace("repeats = 2", "repeats = 4")), tmp_path / "out"
     expected = {r.key for r in read_experiment(path).runs()}
     for size in (10, 20_000):

@@ -38,9 +38,7 @@ def test_two_bodies_of_one_name():
 
 
 def test_a_folder_used_again_keeps_nothing_of_the_run_before(tmp_path):
-    """Files of the user's stay, also where their names look like those of a run; those of the
-    earlier run go.
-    """
+    """The user's files stay, also where they look like those of a run; those of the run go."""
     out, fresh, mine = tmp_path / "out", tmp_path / "fresh", {"notes.txt", "mine.vtu"}
     run(two_blocks("plane-strain"), out)
     first = {file.name for file in out.iterdir()}
@@ -59,9 +57,7 @@ def test_a_folder_used_again_keeps_nothing_of_the_run_before(tmp_path):
 
 
 def test_an_interrupted_run_leaves_nothing(tmp_path):
-    """Ctrl-C at several moments from the start on: exit code 130, one last line, and either all
-    files or none.
-    """
+    """Ctrl-C at several moments: exit code 130, one last line, and either all files or none."""
     for number, wait in enumerate((0.3, 1.0, 2.0)):
         out = tmp_path / f"out{number}" / "below"
         command = [
@@ -214,9 +210,7 @@ def test_a_force_beyond_all_numbers_is_one_sentence(tmp_path, capsys):
 
 
 def test_hidden_folders_of_killed_programs_are_removed_and_those_in_use_are_kept(tmp_path):
-    """A program is killed in the middle of writing; one that writes there a day later tidies up,
-    and nobody else is hurt.
-    """
+    """A program is killed while it writes; one that writes there a day later tidies up."""
     code = (
         "import os, signal, sys\nfrom pathlib import Path\nfrom contactopt.files.writing import"
         " whole_folder\nwith whole_folder(sys.argv[1]) as folder:\n    (folder /"

@@ -27,13 +27,7 @@ REPORTS = Path(__file__).parents[1] / "reports"
 def table(**columns) -> pd.DataFrame:
     """Rows with the given columns; the others as in a successful run."""
     size = max(len(v) for v in columns.values())
-    usual = {
-        "setting": "mid",
-        "tolerance": 1e-6,
-        "start": "cold",
-        "repeat": 0,
-        "success": True,
-    }
+    usual = {"setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True}
     usual |= {
         "claimed": True,
         "status": "solved",
@@ -189,10 +183,7 @@ def reported(tmp_path_factory):
 def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     monkeypatch.chdir(reported)
     text = Path("reports/small/report.md").read_text()
-    for made in (
-        *Path("reports/small").glob("figure-*"),
-        Path("reports/small/report.md"),
-    ):
+    for made in (*Path("reports/small").glob("figure-*"), Path("reports/small/report.md")):
         made.unlink()
 
     def forbidden(*arguments, **settings):
@@ -242,10 +233,7 @@ def test_errors_of_a_report_name_the_figure(reported, monkeypatch, capsys, old, 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda p: p.stem)
 def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch):
-    """Every experiment can be read in both versions, and its report says what its table says.
-
-    Pictures are left out.
-    """
+    """Every experiment can be read in both versions, and its report says what its table says."""
     monkeypatch.setattr(benchmark.report, "_png", lambda figure: b"")
     for quick in (False, True):
         assert benchmark.read_experiment(path, quick=quick).runs()

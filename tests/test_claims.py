@@ -1,6 +1,4 @@
-"""Claims of accuracy are true: rivals are watched, nothing is exact, what does not exist is said,
-the best answer is kept.
-"""
+"""Claims of accuracy are true: rivals are watched, nothing is exact."""
 
 from dataclasses import replace
 
@@ -145,9 +143,7 @@ def test_a_narrow_bump_in_a_wide_contact_is_read_as_the_nodes_have_it():
 
 
 def test_a_wide_contact_with_an_even_pressure_converges():
-    """The largest pressure of a pin in a bush stays that of Persson; rival peaks are refined
-    together.
-    """
+    """The largest pressure of a pin in a bush stays that of Persson."""
     scene = make_scene("pin-in-bush")
     _, estimate = refine([scene], "pressure", 0.01, adaptive=True)
     assert estimate.reached and estimate.value == pytest.approx(scene.reference.peak, rel=0.015)
@@ -159,9 +155,7 @@ def test_a_wide_contact_with_an_even_pressure_converges():
     (lambda x: parabola(x) - 5e-3 * np.exp(-(((x[0] - 0.13) / 0.1) ** 2)), 32, 0.8618),
 ])  # fmt: skip
 def test_a_peak_that_no_smaller_elements_have_shown_is_judged_by_its_neighbours(gap, cells, true):
-    """Claimed was half of the value, whatever the pressure beside it; the values are those of
-    searches for 0.5 %.
-    """
+    """Claimed was half of the value; the true values are those of searches for 0.5 %."""
     _, estimate = refine([pressed(gap, cells=cells)], "pressure", 0.5, adaptive=True)
     first = estimate.levels[0]
     error = abs(first.value - true) / first.value
@@ -209,9 +203,7 @@ def test_what_edges_leave_open_is_where_the_curvature_changes():
 
 
 def test_what_the_corrected_value_changes_is_no_small_error():
-    """Three meshes whose estimates fall while the value moves on: energies of a pin in its bush,
-    whose limit is about 34.69.
-    """
+    """Estimates fall while the value moves on: energies of a pin, whose limit is about 34.69."""
     values, totals = (34.822, 34.787, 34.767), (0.104, 0.021, 0.0083)
     found = [ElementErrors(J, (np.array([more]),), 0.0) for J, more in zip(values, totals)]
     claimed = SAFETY[3] * found[-1].size + misfit(found)

@@ -226,9 +226,7 @@ def test_scenes_are_halved_with_the_curves_that_they_give():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
-    """Near the long facets of the floor lie hundreds of small ones of the walls, with nearer
-    centres.
-    """
+    """Near the long facets of the floor lie small ones of the walls, with nearer centres."""
     heights, kind = (
         np.array([0.0, *np.geomspace(1e-6, 1, 25)]),
         skfem.MeshTri if dim == 2 else skfem.MeshTet,
@@ -269,9 +267,7 @@ def round_body(shape, second, n=5):
 @pytest.mark.parametrize("second", [False, True])
 @pytest.mark.parametrize("shape", ["cone", "torus", "groove", "spline"])
 def test_surfaces_that_are_no_spheres_are_met_up_to_their_rims(shape, second):
-    """New nodes are far nearer to the surface than the chords are, those on the rims too, and the
-    curve that a mesh itself makes is never refused.
-    """
+    """New nodes are far nearer to the surface than the chords are, those on the rims too."""
     mesh, off = round_body(shape, second)
     curves = boundary_curves(mesh)
     fine = straight(mesh)

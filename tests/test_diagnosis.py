@@ -167,9 +167,7 @@ def test_rates_at_a_solution_are_those_of_the_iterations(dim, elements, mu):
 
 
 def test_local_thresholds_of_one_contact():
-    """Slip backwards: eigenvalue -mu / mu*, so that the iterations fail where the solution stays
-    isolated.
-    """
+    """Slip backwards: eigenvalue -mu / mu*."""
     problem = one_contact((-10.0, 1.0), 1.0)
     local = diagnose(problem, solve(problem)).local
     assert (local.stick, local.slip, local.open) == (0, 1, 0)
@@ -187,9 +185,7 @@ def test_all_open():
 
 
 def test_local_turns_with_the_direction_of_slip_in_3d():
-    """One contact in 3D whose tangential compliance is not isotropic: the rates of both iterations,
-    by differences.
-    """
+    """One contact in 3D whose tangential compliance is not isotropic."""
     Q = np.array([[1.0, 0.5, 0.3], [0.5, 2.0, 0.4], [0.3, 0.4, 1.0]])
     problem = InterfaceProblem(Q, [[-1.0, 0.9, -1.2]], 0.4)
     solution = solve(problem, tol=1e-13)

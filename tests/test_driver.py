@@ -202,9 +202,7 @@ def test_a_tolerance_below_rounding_ends_without_an_exception():
 
 
 def test_fallbacks_are_told(caplog):
-    """Contacts at random places have no grid for a preconditioner; the answer says so, and so does
-    the log.
-    """
+    """Contacts at random places have no grid for a preconditioner."""
     rng = np.random.default_rng(1)
     A = rng.normal(size=(36, 36))
     problem = InterfaceProblem(
@@ -281,9 +279,7 @@ def problems_of_the_clock() -> dict[str, InterfaceProblem]:
 @pytest.mark.parametrize("method", ["auto", "nsgs", "proximal", "tresca"])
 @pytest.mark.parametrize("name", problems_of_the_clock())
 def test_steps_do_not_depend_on_the_clock(name, method, monkeypatch):
-    """A clock that runs a thousand times faster or slower: as many iterates, and the same ones, but
-    for the last digits, which depend on where an array begins in memory.
-    """
+    """A clock that runs a thousand times faster or slower."""
     problem, runs, first = problems_of_the_clock()[name], [], []
     clocks = {each: getattr(time, each) for each in ("perf_counter", "monotonic", "process_time")}
     for speed in (1.0, 1e3, 1e-3):

@@ -186,9 +186,7 @@ def test_a_half_model_is_read_as_the_whole(sign):
 
 @pytest.mark.parametrize("centre", [0.0, 1.0, 3.1, 5.9])
 def test_a_zone_across_the_seam_of_a_closed_line(centre):
-    """The same zone anywhere on a closed line of length 2 pi, also across the place where its
-    numbering begins.
-    """
+    """The same zone anywhere on a closed line of length 2 pi."""
     angle = np.linspace(0.0, 2 * np.pi, 240, endpoint=False)
     space = np.stack([np.cos(angle), np.sin(angle)])
     scene, problem = contact(space, "plane-strain", np.full(240, 2 * np.pi / 240))
@@ -259,9 +257,7 @@ def test_slip_of_a_small_step_does_not_move_the_stick_edge():
 
 
 def test_the_edge_of_a_flat_punch_is_that_of_the_surface():
-    """Every contact touches, and the pressure grows towards the corner: the half-width is exact.
-    Where it falls, contact may end within the last element.
-    """
+    """Every contact touches, and the pressure grows towards the corner: the half-width is exact."""
     scene = make_scene("rigid-punch-2d", mu=0.5)
     solved = solve_scene(scene, 8)
     problem, r = solved.reduction.problem, solved.solution.reactions

@@ -1,6 +1,4 @@
-"""Shape and degree of the elements: patch test, weights of the contact surface, exactness, no
-ripple in Hertz.
-"""
+"""Shape and degree of the elements: patch test, weights of the contact surface, exactness."""
 
 from dataclasses import replace
 from itertools import permutations, product
@@ -112,9 +110,7 @@ def test_stiffness_is_the_weak_form_of_elasticity(kind, degree, cut):
 
 @pytest.mark.parametrize("kind,degree,cut", SHAPES)
 def test_weights_pass_on_force_and_its_moment(kind, degree, cut):
-    """Rows of W add up to 1; A' W is the force of unit pressure on every node; contacts stay on
-    their plane.
-    """
+    """Rows of W add up to 1; A' W is the force of unit pressure on every node."""
     body = body_of(kind, degree, cut)
     W = body.trace.weights
     assert np.allclose(W.sum(axis=1), 1, atol=1e-12)
@@ -133,9 +129,7 @@ def test_weights_pass_on_force_and_its_moment(kind, degree, cut):
 @pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_quadratic_displacement_has_no_error(kind, cut):
-    """A clamped-free bar under its own weight: the displacement is quadratic, the reaction is its
-    weight.
-    """
+    """A clamped-free bar under its own weight."""
     scene = with_elements(two_blocks(kind), 2, cut)
     up = scene.components[-1]
     sides = tuple(s for s in scene.lower.supports if s.boundary != "bottom")
@@ -213,9 +207,7 @@ def test_other_degrees_are_refused(degree):
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_half_model_is_half_of_the_whole(degree):
-    """The tangential component on the plane of symmetry belongs to the support, without its
-    neighbours.
-    """
+    """The tangential component on the plane of symmetry belongs to the support."""
     x = np.array([0.0, 0.3, 0.7, 1.0])
     whole, half = (
         tensor_mesh(grid, np.linspace(0, 1, 4)) for grid in (np.concatenate([-x[:0:-1], x]), x)
@@ -239,10 +231,7 @@ def test_a_half_model_is_half_of_the_whole(degree):
 
 
 def test_the_gap_of_a_curved_body_does_not_alternate():
-    """Edges are straight, the sphere is not: Part.curve knows.
-
-    Without it the middles of edges would touch too late.
-    """
+    """Edges are straight, the sphere is not: Part.curve knows."""
     scene = scenes.make_scene("sphere", degree=2, elements=8, mu=0.0)
     a = scene.reference.half_width
     ripple = []
@@ -295,9 +284,7 @@ def test_small_elements_far_from_the_origin_keep_their_areas(dim, degree):
 
 @pytest.mark.parametrize("scale, off", [(1.0, 0.0), (1e-3, 100.0)])
 def test_a_traction_on_bricks_of_second_order_wherever_they_are(scale, off):
-    """Bricks of any shape, small and far from the origin: the force is the traction times the area
-    of the side, and its moment that of an even pressure.
-    """
+    """Bricks of any shape, small and far from the origin."""
     mesh = skfem.MeshHex().refined(1)
     inside = np.all((mesh.p > 0) & (mesh.p < 1), axis=0)
     p = scale * (mesh.p + np.where(inside, 0.13, 0.0)) + off

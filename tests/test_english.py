@@ -1,7 +1,4 @@
-"""Idioms that were translated from another language, and that the field does not use. They stood on
-pages, in docstrings and in messages; this list keeps them from coming back. CONTRIBUTING.md says
-what to write instead.
-"""
+"""Idioms that were translated from another language, and that the field does not use."""
 
 import re
 from pathlib import Path

@@ -144,9 +144,7 @@ def body_of_nodes(name, shape, at):
 
 @pytest.mark.parametrize("elements", [2, 1])
 def test_nodes_of_a_whole_body_are_no_surface_that_may_touch(tmp_path, elements):
-    """Gmsh's option SaveGroupsOfNodes writes the nodes of each body as a set; so does HyperMesh. A
-    set that holds a support is no surface either. With one element there is no node inside.
-    """
+    """Gmsh's option SaveGroupsOfNodes writes the nodes of each body as a set; so does HyperMesh."""
     low = block("quad", 1, (elements, 2))
     up = block("quad", 1, (elements, 2), first=101, at=(0.0, 2.0, 0.0))
     text = body_of_nodes("LOWER", low, 0.0) + body_of_nodes("UPPER", up, 2.0)

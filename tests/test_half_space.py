@@ -1,6 +1,4 @@
-"""Half-spaces: kernels against quadrature and equilibrium, solutions against exact ones, one answer
-by every road.
-"""
+"""Half-spaces: kernels against quadrature and equilibrium, solutions against exact ones."""
 
 from itertools import pairwise
 
@@ -9,15 +7,7 @@ import pytest
 from scipy.integrate import dblquad, quad
 
 import contactopt
-from contactopt import (
-    HalfSpace,
-    InputError,
-    Material,
-    Rigid,
-    Scene,
-    natural_map_residual,
-    scenes,
-)
+from contactopt import HalfSpace, InputError, Material, Rigid, Scene, natural_map_residual, scenes
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.linear.convolution import Convolution
@@ -58,9 +48,7 @@ def ball(n=20, law="coulomb", mu=0.3, shear=0.4, m=None, lower=STEEL, upper=None
     "dim,periodic,lower", [(2, False, True), (2, True, False), (3, False, False), (3, True, True)]
 )
 def test_the_height_counts_beside_a_flat_rigid_body(dim, periodic, lower):
-    """It gives the answer of the same shape as a gap, whichever body it is on, and of a rigid
-    half-space.
-    """
+    """It gives the answer of the same shape as a gap, whichever body it is on."""
     points, axis = (ticks(12),) * (dim - 1), "xyz"[dim - 1]
     force = {axis: -3.0}
 
@@ -92,9 +80,7 @@ PLACES = [
 
 @pytest.mark.parametrize("cell,place", [*PLACES, ((1.0, 50.0), (13, 0)), ((50.0, 1.0), (0, 65))])
 def test_coefficients_are_integrals_of_point_forces(cell, place):
-    """Boussinesq's and Cerruti's displacements, integrated by adaptive quadrature over the cell in
-    quarters.
-    """
+    """Boussinesq's and Cerruti's displacements."""
     (hx, hy), nu = cell, STEEL.nu
     G = STEEL.E / 2.6
     made = half_space_influence(STEEL, (hx, hy), tuple(np.array([p]) for p in place))

@@ -1,6 +1,4 @@
-"""Bodies that nothing but friction holds: certified in the plane and in space, alike in other units
-and turned.
-"""
+"""Bodies that nothing but friction holds."""
 
 from dataclasses import replace
 
@@ -70,9 +68,7 @@ def test_the_same_answer_as_by_pivoting_turned_and_in_other_units():
 
 
 def test_a_weighted_median_is_found_exactly():
-    """sum g_i |c_i - x| is least at the weighted median, where one interval alone is not at its
-    end.
-    """
+    """sum g_i |c_i - x| is least at the weighted median."""
     rng = np.random.default_rng(4)
     c, g = rng.normal(size=21), 1e-8 * rng.uniform(1, 2, 21)
     order = np.argsort(c)

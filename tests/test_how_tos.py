@@ -1,6 +1,4 @@
-"""The how-to pages run as they stand: files are written, commands executed, Python run with its own
-assertions.
-"""
+"""The how-to pages run as they stand: files are written, commands executed."""
 
 import inspect
 import re

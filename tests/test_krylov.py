@@ -1,6 +1,4 @@
-"""Everything that solves from products with Q alone: operators, Newton steps, subproblems, nested
-meshes.
-"""
+"""Everything that solves from products with Q alone."""
 
 from dataclasses import replace
 
@@ -19,12 +17,7 @@ from contactopt import (
 )
 from contactopt.bodies.assembled import Work
 from contactopt.coupling.costs import AGAIN, estimates
-from contactopt.linear.operators import (
-    InterfaceOperator,
-    block,
-    loosened,
-    shifted,
-)
+from contactopt.linear.operators import InterfaceOperator, block, loosened, shifted
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.krylov import Krylov, model_of
 from contactopt.methods.kernels.semismooth import Evaluated, Factored
@@ -162,9 +155,7 @@ def test_penalty_takes_products_too():
 
 
 def test_auto_falls_back_on_the_entries_of_Q():
-    """Strong friction, where Newton's method needs the rest of the chain: an operator must not stop
-    it.
-    """
+    """Strong friction, where Newton's method needs the rest of the chain."""
     explicit, _ = forms("punch-2d", mu=5.0)
     wrapped = InterfaceOperator(lambda X, accuracy: explicit.Q @ X, np.diag(explicit.Q).copy())
     problem = InterfaceProblem(
@@ -268,9 +259,7 @@ def test_preconditioner_and_explicit_Q_exclude_each_other():
 
 
 def test_operators_that_share_their_work_count_together():
-    """A block, looser products and a shifted diagonal count with the operator that they are made
-    from; a scaled one does not.
-    """
+    """What is made from an operator counts with it; a scaled one does not."""
     Q = InterfaceOperator(lambda X, accuracy: 2 * X, np.full(4, 2.0), inexact=True)
     x = np.ones(4)
     assert np.all(Q @ x == 2) and Q.products == 1
@@ -290,9 +279,7 @@ def test_operators_that_share_their_work_count_together():
     ],
 )
 def test_thin_tied_layers_are_solved_from_products_with_q(dim, elements, count, options):
-    """Layers tied to each other are the whole body. The thinnest of eight is a hundred times wider
-    than high, and held by tied pairs alone.
-    """
+    """Layers tied to each other are the whole body."""
     scene = scenes.flat_punch(dim, elements=elements)
     problem = reduce(layered(scene, count), **options)
     assert problem.Q.diagonal.min() >= 0.0  # signs of one pair say nothing of another

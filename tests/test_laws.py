@@ -1,6 +1,4 @@
-"""Laws of contact and friction: each against its conditions written out, a program in cvxpy, or
-another law.
-"""
+"""Laws of contact and friction: each against its conditions and a program in cvxpy."""
 
 import sys
 from dataclasses import dataclass, replace
@@ -196,9 +194,7 @@ def test_derivatives_are_difference_quotients(name):
 
 @pytest.mark.parametrize("name", [name for name, law in ALL.items() if law.convex])
 def test_convex_laws_project_on_a_fixed_convex_set(name):
-    """The projection is the gradient of a convex function: firmly non-expansive, with a symmetric
-    derivative.
-    """
+    """The projection is the gradient of a convex function."""
     rng = np.random.default_rng(2)
     x, y, law = rng.normal(size=(200, 3)), rng.normal(size=(200, 3)), ALL[name].spread(200)
     (a, D), b = law.project(x), law.project(y)[0]
@@ -209,9 +205,7 @@ def test_convex_laws_project_on_a_fixed_convex_set(name):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_units_change_nothing(name):
-    """Forces in units of 1e-6 and lengths in units of 1e4 give the same forces, written in those
-    units.
-    """
+    """Forces in units of 1e-6 and lengths in units of 1e4 give the same forces."""
     problem = random_problem(ALL[name])
     force, length = 1e6, 1e-4
     other = InterfaceProblem(

@@ -1,6 +1,4 @@
-"""The factor on a load that friction holds, against statics done by hand, Janssen's equation, and
-what a run solves just below and above it.
-"""
+"""The factor on a load that friction holds, against statics by hand and Janssen's equation."""
 
 import math
 import re
@@ -265,9 +263,7 @@ def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, fact
 
 @pytest.mark.slow
 def test_a_wedge_that_locks_itself_rests_only_where_its_forces_arise():
-    """Forces in the cones balance any pull on it, but it lifts off where the pull exceeds the push
-    on its top: below .15 times the push.
-    """
+    """Forces in the cones balance any pull on it."""
     mesh = quadrilateral([(-0.5, 0), (0.5, 0), (1, 1), (-1, 1)], {}, (4, 2))
     loads = Traction("top", (0.0, -0.5)), BodyForce((0.0, 0.1))
     body = Part("wedge", mesh, Material(1000.0, 0.3), loads=loads)
@@ -317,9 +313,7 @@ def test_loads_that_are_not_there_are_refused_and_the_command_says_the_answer(ca
 
 
 def test_an_open_corner_that_closes_after_a_turn_is_not_counted():
-    """A bar leans at 60 degrees, touched at one corner of each end; moments about its foot give the
-    factor at which it slides. The other corner at the wall would close after 1.7 rad.
-    """
+    """A bar leans at 60 degrees, touched at one corner of each end."""
     length, width, lean, mu = 4.0, 0.2, math.pi / 3, 0.5
     cosine, sine = math.cos(lean), math.sin(lean)
     turned = np.array([[cosine, -sine], [sine, cosine]]) @ [

@@ -268,9 +268,7 @@ def resident():
 
 @pytest.mark.slow
 def test_factors_are_freed_whatever_thread_made_them():
-    """SuperLU forgets its memory where another thread frees it: solvers made and dropped must not
-    add up.
-    """
+    """SuperLU forgets its memory where another thread frees it."""
     scene = scenes.flat_punch(3)
     arguments = system(scene, scene.lower, 8)
     before, sizes = set(threading.enumerate()), []  # threads of other tests may end meanwhile
@@ -290,9 +288,7 @@ def test_factors_are_freed_whatever_thread_made_them():
 
 
 def test_factors_may_be_freed_at_any_moment():
-    """The collector may free a solver while this very thread holds the locks of a pool that it is
-    starting.
-    """
+    """The collector may free a solver while this thread holds the locks of a pool."""
     program = """
 import gc
 from concurrent.futures import ThreadPoolExecutor

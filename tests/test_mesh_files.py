@@ -1,6 +1,4 @@
-"""Meshes from files: geometry and groups as they were written, faults repaired or refused in a
-sentence.
-"""
+"""Meshes from files: geometry and groups as they were written."""
 
 import logging
 import os

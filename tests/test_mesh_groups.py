@@ -150,9 +150,7 @@ Low._Over_S2, S3
 
 
 def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
-    """The upper brick is lifted by 3 and turned by a quarter about the edge y at that height:
-    (x, y, z) goes to (z, y, 3 - x).
-    """
+    """The upper brick is lifted by 3 and turned by a quarter about the edge y at that height."""
     path, text = tmp_path / "two.inp", ASSEMBLY.format(brick=brick_of_twenty(0.0, 1))
     path.write_text(text)
     low, up = load_mesh(path, "Low"), load_mesh(path, "Up")
@@ -188,9 +186,7 @@ def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
 
 
 def test_sets_of_the_elements_of_a_body_are_no_bodies(tmp_path):
-    """Abaqus writes an internal set of elements for each surface. A set of all elements of two
-    bodies is none either, and hides none.
-    """
+    """Abaqus writes an internal set of elements for each surface."""
     path = tmp_path / "strip.inp"
     nodes = "\n".join(f"{i + 3 * j + 1}, {i}, {j}" for j in range(2) for i in range(3))
     path.write_text(

@@ -267,9 +267,7 @@ PAIRS = [(name, None) for name in PROGRAMS] + [
 
 @pytest.mark.parametrize(("name", "facets"), PAIRS)
 def test_primal_and_dual_have_each_others_multipliers(name, facets, problem):
-    """The value changes its sign; forces, gaps, slips and approaches are the same to 1e-8. With
-    discs they are as near as the root of the gap of 1e-13 allows, since the energy is quadratic.
-    """
+    """The value changes its sign; forces, gaps, slips and approaches are the same to 1e-8."""
     near = 3e-7 if problem.dim == 3 and facets is None else 1e-8
     rng = np.random.default_rng(5)
     k, d = problem.contacts, problem.dim - 1

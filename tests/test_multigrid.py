@@ -11,10 +11,7 @@ from contactopt.bodies.body import build_body
 from contactopt.bodies.solvers import multigrid
 from contactopt.bodies.solvers import sparse_products as products
 from contactopt.bodies.solvers.constants import RTOL
-from contactopt.bodies.solvers.multigrid import (
-    conjugate_gradients,
-    nodal_blocks,
-)
+from contactopt.bodies.solvers.multigrid import conjugate_gradients, nodal_blocks
 from contactopt.bodies.solvers.sparse_products import SparseProduct
 from contactopt.bodies.solvers.system import Submatrix, System
 from contactopt.errors import BackendError, InputError
@@ -102,9 +99,7 @@ def test_threads_share_products_without_a_trace(form, monkeypatch):
 
 
 def test_a_block_is_the_matrix_without_the_other_rows():
-    """Multigrid for a Submatrix, which copies nothing, is multigrid for the rows and columns
-    themselves.
-    """
+    """Multigrid for a Submatrix is multigrid for the rows and columns themselves."""
     A, *rest = BODIES["solid punch"]
     n = A.shape[0]
     whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))

@@ -1,6 +1,4 @@
-"""The rooms of the museum: what a page answers in the browser is what contactopt answers, every
-sentence that links to a room finds it, and a page can be read and used.
-"""
+"""The rooms of the museum: what a page answers in the browser is what contactopt answers."""
 
 import itertools
 import json

@@ -1,7 +1,4 @@
-"""What the rooms of the museum say is true at every position of their sliders: at the ends, at
-zero, and where a theorem holds with equality. The answers come from linear programs, one for each
-combination of states, which know neither the pages nor contactopt's enumeration.
-"""
+"""What the rooms of the museum say is true at every position of their sliders."""
 
 import itertools
 import json

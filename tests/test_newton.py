@@ -100,9 +100,7 @@ def test_steps_hardly_depend_on_the_mesh(elements):
 @pytest.mark.parametrize("reach", [2.0, 200.0])
 @pytest.mark.parametrize("mu", [0.0, 0.4])
 def test_steps_hardly_depend_on_how_far_the_surfaces_reach(reach, mu):
-    """A cylinder on a half-plane, candidates up to 200 half-widths away: peeling them off one by
-    one takes 30 steps.
-    """
+    """Candidates up to 200 half-widths away: peeling them off one by one takes 30 steps."""
     right = np.concatenate([np.linspace(0, 2, 41), 2.0 * np.geomspace(1.0, 100.0, 25)[1:]])
     x = np.concatenate([-right[:0:-1], right])
     x = x[np.abs(x) <= reach]

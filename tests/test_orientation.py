@@ -77,9 +77,7 @@ def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
 
 @pytest.mark.parametrize("clearance", [0.0, 0.5, 4.0])
 def test_a_pin_in_a_bush_is_coupled_along_the_radius(clearance):
-    """Concentric circles: the gap is the clearance everywhere, every partner lies on the same
-    radius.
-    """
+    """Concentric circles: the gap is the clearance, every partner lies on the same radius."""
     scene = turned.pin_in_bush(clearance=clearance)
     reduction = reduce_bodies(scene)
     assert np.allclose(reduction.coupling.gap, clearance, rtol=0.02, atol=1e-12)

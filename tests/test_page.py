@@ -1,6 +1,4 @@
-"""The page of a result: what is on it is what was computed, it stands alone, and a browser can use
-it.
-"""
+"""The page of a result: what is on it is what was computed, it stands alone."""
 
 import base64
 import gzip
@@ -97,8 +95,7 @@ def test_half_models_are_shown_whole(folder):
 
 
 def test_what_touches_is_drawn_touching(tmp_path):
-    """A press fit overlaps before it is loaded: with displacements magnified, the drawn surfaces
-    are apart by as many times the gap that there is, which is none where they touch."""
+    """With displacements magnified, drawn surfaces that touch have no gap."""
     result = run("press-fit", tmp_path, figures=(), html=True)
     data, s = data_of(tmp_path / "view.html"), 100.0
     (pair,) = result.scene.pairs

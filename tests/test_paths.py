@@ -248,9 +248,7 @@ def test_a_state_that_nothing_can_hold_is_named():
 
 @pytest.mark.parametrize("kept", [True, False])
 def test_bodies_of_every_state_carry_its_own_loads(kept):
-    """A block that only the floor holds is pressed and pushed by tractions: its displacements at a
-    state are those of the path that ends there, whether the path kept them or finds them again.
-    """
+    """Displacements at a state are those of the path that ends there, kept or found again."""
 
     def pushed(x):
         block = replace(dragged(0.0).upper, supports=(), loads=(Traction("top", (x, -1.0)),))

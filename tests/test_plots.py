@@ -8,17 +8,7 @@ from conftest import two_blocks
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from contactopt import (
-    HalfSpace,
-    Material,
-    Rigid,
-    Scene,
-    plots,
-    reduce_bodies,
-    run,
-    scenes,
-    solve,
-)
+from contactopt import HalfSpace, Material, Rigid, Scene, plots, reduce_bodies, run, scenes, solve
 from contactopt.figures.solids import nearest, picture
 from contactopt.figures.style import COLUMN, draw_lines, paper_axes, save_figure
 
@@ -140,9 +130,7 @@ def test_triangles_and_convergence_are_drawn():
 
 
 def test_nearer_bodies_hide_those_behind_them_in_every_pixel():
-    """Two triangles that pierce each other, and a small one before a large one whose middle is
-    nearer to the eye.
-    """
+    """Two triangles that pierce each other, and a small one before a large one."""
     big = np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.0, 40.0, 0.0]])
     # nearer beyond half of its width
     tilted = big + np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])

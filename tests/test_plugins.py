@@ -1,6 +1,4 @@
-"""Adding a plug-in costs one file and one line: each example of the page is added to a copy of the
-package and used by its name.
-"""
+"""Each example of the page of plug-ins is added to a copy of the package and used."""
 
 import json
 import re

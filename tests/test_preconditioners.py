@@ -7,16 +7,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, cg
 
-from contactopt import (
-    InputError,
-    InterfaceProblem,
-    Material,
-    Part,
-    Scene,
-    Support,
-    reduce,
-    scenes,
-)
+from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce, scenes
 from contactopt.meshes.structured import graded, rename, tensor_mesh
 from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.preconditioners import (
@@ -26,10 +17,7 @@ from contactopt.methods.preconditioners import (
     restricted,
     smooth_motions,
 )
-from contactopt.methods.preconditioners.circulant import (
-    norm,
-    seminorm,
-)
+from contactopt.methods.preconditioners.circulant import norm, seminorm
 from contactopt.problem.chart import Chart
 
 SIZES = (17, 33, 65)  # contacts
@@ -93,9 +81,7 @@ def normal_block(problem: InterfaceProblem, name: str) -> tuple[np.ndarray, np.n
 
 @pytest.mark.parametrize("k", SIZES)
 def test_condition_numbers_of_the_papers_preconditioners(k):
-    """Against the matrices of eqs (25) and (26) written down densely; both improve on Q, more so
-    the more contacts.
-    """
+    """Against the matrices of eqs (25) and (26) written down densely."""
     problem, m = blocks(k, 5.0, 5.0, 0.3), int(2 ** np.ceil(np.log2(k)))
     Q = problem.Q[::2, ::2]
     first = la.circulant(seminorm(m))[:k, :k]

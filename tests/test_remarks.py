@@ -1,6 +1,4 @@
-"""Every remark that the package makes reaches the reader: the summary, the command line, pages and
-notebooks. The places that make one are found in the code, so that a new one is tested, too.
-"""
+"""Every remark that the package makes reaches the reader."""
 
 import ast
 import importlib
@@ -73,9 +71,7 @@ def test_nothing_speaks_past_the_log():
 
 
 def test_warnings_and_notes_of_all_modules_reach_the_reader(tmp_path, capsys, monkeypatch):
-    """Each module that warns does so while the scene is posed, by its own logger; each that makes
-    notes does so while the problem is solved, by the function that it calls.
-    """
+    """Modules that warn do so while the scene is posed; those that note, while it is solved."""
     warned, noted = speaking()
     assert len(warned) > 3 and len(noted) > 8
     whole, follow = posing.assemble, driver._follow

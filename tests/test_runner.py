@@ -140,10 +140,7 @@ def test_list(capsys):
     "arguments,words",
     [
         (["nowhere"], "unknown scene 'nowhere'; choose from punch-2d, punch-3d, sphere"),
-        (
-            ["punch-2d", "--normal", "simplex"],
-            "unknown qp backend 'simplex'; choose from clarabel",
-        ),
+        (["punch-2d", "--normal", "simplex"], "unknown qp backend 'simplex'; choose from clarabel"),
         (
             ["punch-3d", "--tangential", "proxqp"],
             "unknown conic backend 'proxqp'; choose from clarabel",

@@ -1,6 +1,4 @@
-"""Half-spaces, materials, load steps and changed entries of scene files, and their JSON schema,
-against the same scenes in Python.
-"""
+"""Half-spaces, materials, load steps and changed entries of scene files."""
 
 import json
 import re

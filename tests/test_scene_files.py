@@ -112,17 +112,7 @@ def test_every_entry_reaches_the_scene(tmp_path):
         tmp_path / "disc.vtu",
         meshio.Mesh(
             np.pad(plane.p.T, [(0, 0), (0, 1)]),
-            [
-                (
-                    "triangle6",
-                    skfem.io.meshio.to_meshio(
-                        plane,
-                        encode_cell_data=False,
-                    )
-                    .cells[0]
-                    .data,
-                )
-            ],
+            [("triangle6", skfem.io.meshio.to_meshio(plane, encode_cell_data=False).cells[0].data)],
             cell_data={"part": [np.ones(plane.nelements, int)]},
         ),
     )

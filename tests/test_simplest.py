@@ -1,6 +1,4 @@
-"""What may be left out of a scene: symmetries that are there are found, those that are not there
-are not.
-"""
+"""What may be left out of a scene: symmetries that are there are found."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,17 +9,7 @@ import skfem
 from turned import moved, turn
 
 import contactopt
-from contactopt import (
-    Material,
-    Part,
-    Plate,
-    Rigid,
-    Scene,
-    Support,
-    Traction,
-    scenes,
-    simplify,
-)
+from contactopt import Material, Part, Plate, Rigid, Scene, Support, Traction, scenes, simplify
 from contactopt.bodies import views
 from contactopt.bodies.fields import Region
 from contactopt.meshes.polar import ring
@@ -258,9 +246,7 @@ def test_asperities_and_patches_that_few_contacts_see_are_seen():
     ids=["gap", "friction", "force"],
 )
 def test_the_whole_refuses_what_a_comparison_would_have_missed(scene, monkeypatch):
-    """The proof reads nothing of what was compared: with blind comparisons it still finds every
-    asymmetry.
-    """
+    """With blind comparisons the proof still finds every asymmetry."""
     monkeypatch.setattr(images, "equal_functions", lambda *a: True)
     if scene.name == "punch":
 
@@ -277,9 +263,7 @@ def test_the_whole_refuses_what_a_comparison_would_have_missed(scene, monkeypatc
 
 
 def test_stress_at_the_plane_is_that_of_the_whole():
-    """No shear is left across the plane of symmetry, and what is recovered there looks at both
-    sides.
-    """
+    """No shear is left across the plane of symmetry."""
     for degree in (1, 2):
         whole = replace(punch(), degree=degree)
         one, other = (
@@ -369,9 +353,7 @@ def prism(axis: int = 1, held: bool = True, push: float = 0.0) -> Scene:
 
 
 def test_rollers_at_a_contact_are_no_planes_of_symmetry():
-    """A whole block between rollers: after a cut in x its walls would be taken for mirrors, and
-    resultants halved.
-    """
+    """Walls would be taken for mirrors after a cut in x, and resultants halved."""
     scene = prism(held=False, axis=1)
     walls = scene.with_parts(
         lambda part: replace(

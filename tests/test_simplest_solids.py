@@ -7,16 +7,7 @@ import pytest
 from test_simplest import SOFT, TIGHT, numbers, prism, punch
 
 import contactopt
-from contactopt import (
-    InputError,
-    Part,
-    Rigid,
-    Scene,
-    Support,
-    cli,
-    scenes,
-    simplify,
-)
+from contactopt import InputError, Part, Rigid, Scene, Support, cli, scenes, simplify
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.solving.solve_scene import solve_scene
 
@@ -44,9 +35,7 @@ def test_a_prism_that_is_not_in_plane_strain(scene, reason):
 
 @pytest.mark.parametrize("way", ["gap", "friction", "curve"])
 def test_what_changes_along_a_prism_is_seen(way):
-    """A ridge, a slippery band or a crown over a part of a roller, where three stations along it
-    see nothing.
-    """
+    """On a part of a roller, where three stations along it see nothing."""
 
     def band(x: np.ndarray) -> np.ndarray:
         return np.abs(x[1] - 0.62) < 0.05

@@ -1,6 +1,4 @@
-"""The documentation is built from scratch, warnings as errors, tutorials executed; its pages are
-whole.
-"""
+"""The documentation is built from scratch, warnings as errors, tutorials executed."""
 
 import re
 import subprocess

@@ -1,6 +1,4 @@
-"""The preconditioner of any contact mesh, against dense formulas, closed curves and the kernel of
-the half-space.
-"""
+"""The preconditioner of any contact mesh, against dense formulas."""
 
 from dataclasses import replace
 
@@ -13,11 +11,7 @@ from skfem import MeshQuad, MeshTri
 from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.methods.preconditioners.surface import (
-    divergences,
-    laplacian,
-    surface_matrices,
-)
+from contactopt.methods.preconditioners.surface import divergences, laplacian, surface_matrices
 from contactopt.problem.chart import Chart
 
 POISSON = 0.3
@@ -224,9 +218,7 @@ def test_on_a_closed_curve_the_circulant_is_exact(name):
 
 
 def test_tangential_waves_along_their_direction_meet_more_resistance():
-    """The plane waves of `grad u : grad v + ALONG div u div v` on a large square, far from its
-    edges.
-    """
+    """Plane waves of `grad u : grad v + ALONG div u div v` on a large square."""
     mesh = MeshTri.init_tensor(*[np.linspace(0, 1, 33)] * 2)
     x = mesh.p
     D = divergences(x, x, mesh.t)

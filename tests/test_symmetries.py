@@ -1,6 +1,4 @@
-"""Answers do not depend on the numbering of contacts, the choice of tangents, units, or which body
-is called the upper one.
-"""
+"""Answers do not depend on the numbering of contacts, the choice of tangents, units."""
 
 from dataclasses import replace
 
@@ -156,9 +154,7 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_upper_and_lower_body_may_be_swapped(name):
-    """Forces in space change their sign, for they then act on the other body; a plate moves as
-    before.
-    """
+    """Forces in space change their sign, for they then act on the other body."""
     scene = SCENES[name]()
     first, second = (
         reduce_bodies(s) for s in (scene, replace(scene, upper=scene.lower, lower=scene.upper))

@@ -8,18 +8,7 @@ import pytest
 import skfem
 from test_corners import KINDS, NU, E, box, seated
 
-from contactopt import (
-    Contact,
-    Material,
-    Part,
-    Rigid,
-    Scene,
-    Support,
-    Traction,
-    reduce,
-    run,
-    solve,
-)
+from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce, run, solve
 from contactopt.errors import InputError
 
 

@@ -1,6 +1,4 @@
-"""Turning or mirroring a whole scene turns the answer, what is read from it, and the work that it
-takes.
-"""
+"""Turning or mirroring a scene turns the answer and what is read from it."""
 
 import numpy as np
 import pytest
@@ -181,9 +179,7 @@ def quarter(scene):
 
 @pytest.mark.parametrize(("name", "turns"), [("punch-2d", 1), ("cylinder-2d", 2), ("punch-2d", 3)])
 def test_a_half_model_in_any_direction(name, turns, tmp_path):
-    """The named scenes, whose plane of symmetry then is y = 0: the same summary, zone loop and
-    figures.
-    """
+    """The named scenes, whose plane of symmetry then is y = 0, have the same summary."""
     from contactopt import run
     from contactopt.scenes import make_scene
 

@@ -1,6 +1,4 @@
-"""What a run says of a scene is so: no imbalance where nothing acts, no plane that is not there, no
-empty name, and no sign of a zero.
-"""
+"""What a run says of a scene is so: no imbalance where nothing acts, no plane that is not there."""
 
 from dataclasses import replace
 

@@ -1,6 +1,4 @@
-"""One sentence instead of a hang, a traceback or a wrong answer: files and arguments that somebody
-once gave.
-"""
+"""One sentence instead of a hang, a traceback or a wrong answer."""
 
 import os
 from dataclasses import replace
@@ -76,9 +74,7 @@ def named(wrong):
 
 @pytest.mark.parametrize("name", ["W/x", "W/i", "vectors/q", "vectors/mu"])
 def test_sizes_that_a_file_only_declares_take_no_memory(tmp_path, name):
-    """A file of some kilobytes that announces 8 terabytes: a data set without data, which HDF5
-    reads as zeros.
-    """
+    """A data set without data announces 8 terabytes, which HDF5 reads as zeros."""
     import h5py
 
     path = sound(tmp_path / "huge.hdf5")
@@ -282,9 +278,7 @@ def test_a_list_of_scenes_is_a_path():
 )
 @pytest.mark.parametrize("column", [[0.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [1e-300, 0.0]], ids=str)
 def test_a_plate_that_no_contact_can_hold(method, column):
-    """V is zero, moves along the surface of contacts without friction, or pulls: an answer or one
-    sentence.
-    """
+    """V is zero, moves along the surface, or pulls: an answer or one sentence."""
     problem = InterfaceProblem(np.eye(2), [[0.1, 0.0]], 0.0, np.array(column)[:, None], [-1.0])
     try:
         assert not solve(problem, method, max_iterations=50, time_limit=1.0).solved

@@ -37,9 +37,7 @@ def test_the_zone_ends_at_a_node_and_is_read_from_the_answer(hertz):
 
 
 def test_a_finer_mesh_without_remeshing_reads_the_same_zone(hertz):
-    """Four times as many elements, and no node at the edge: what the loop ends at is no property of
-    its meshes.
-    """
+    """Four times as many elements: what the loop ends at is no property of its meshes."""
     scene, _, _, zones = hertz
     problem = reduce(scene, elements=4 * scene.elements, zone=1.1 * scene.reference.half_width)
     assert contact_edge(scene, problem, solve(problem).reactions) == pytest.approx(
@@ -122,9 +120,7 @@ def test_the_status_of_contacts():
 
 
 def test_stick_ratio_of_the_rigid_punch():
-    """Spence's exact value .689087 for plane strain, nu = mu = .3, on a foundation 1,280
-    half-widths wide.
-    """
+    """Spence's exact value for plane strain, nu = mu = .3."""
     scene = scenes.flat_punch(
         2, rigid="punch", mu=0.3, foundation_width=25600, foundation_height=12800, elements=64
     )

@@ -1,6 +1,4 @@
-"""Scenes that are not symmetric to the axes of space, and the same scenes turned or mirrored as a
-whole.
-"""
+"""Scenes that are not symmetric to the axes, and the same turned or mirrored."""
 
 from collections.abc import Callable
 from dataclasses import replace
