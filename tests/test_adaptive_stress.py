@@ -14,7 +14,6 @@ from contactopt.accuracy.corners import grows
 from contactopt.accuracy.indicators import element_errors, pressure_errors, read_once
 from contactopt.cli import main
 from contactopt.coupling.reduction import reduce_bodies
-from contactopt.readings.corners import filled, re_entrant
 from contactopt.readings.quantities import find_quantity
 from contactopt.scenes import make_scene
 from contactopt.scenes.refined_scenes import split_scene
@@ -79,21 +78,6 @@ def test_a_re_entrant_corner_is_recognised_and_said():
     )
     assert np.linalg.norm(estimate.levels[-1].place) < 0.2 and len(estimate.levels) < 10
     assert locally(angle_bracket(), "von_mises:bracket@-0.5,0.1", 0.02)[1].reached
-
-
-def test_shares_of_the_full_angle():
-    square = skfem.MeshTri.init_tensor(*2 * (np.linspace(0, 1, 3),))
-    cube = skfem.MeshTet.init_tensor(*3 * (np.linspace(0, 1, 3),))
-    for mesh, corner in ((square, 1 / 4), (cube, 1 / 8)):
-        nodes = {tuple(p): i for i, p in enumerate(mesh.p.T.tolist())}
-        dim = len(mesh.p)
-        assert filled(mesh, nodes[(0.0,) * dim]) == pytest.approx(corner)
-        assert filled(mesh, nodes[(0.5,) * (dim - 1) + (0.0,)]) == pytest.approx(1 / 2)
-        assert filled(mesh, nodes[(0.5,) * dim]) == pytest.approx(1)
-        assert not re_entrant(mesh, nodes[(0.0,) * dim])
-    lshaped = skfem.MeshTri.init_lshaped().refined(2)
-    origin = int(np.argmin(np.linalg.norm(lshaped.p, axis=0)))
-    assert filled(lshaped, origin) == pytest.approx(3 / 4) and re_entrant(lshaped, origin)
 
 
 def test_a_quarter_model_whose_nodes_do_not_match_knows_its_planes():

@@ -42,12 +42,6 @@ def test_the_steps_of_each_problem_are_counted():
     assert apart.iterations == 0 < touching.iterations <= batch.STEPS
 
 
-def test_a_singular_problem_leaves_the_others_alone():
-    M = np.stack([np.eye(2), np.zeros((2, 2)), 2 * np.eye(2)])
-    x = batch._solved(M, np.ones((3, 2, 1)))[:, :, 0]
-    assert np.array_equal(x[[0, 2]], [[1.0, 1.0], [0.5, 0.5]]) and np.isnan(x[1]).all()
-
-
 def test_friction_of_each_problem_and_no_problem_at_all():
     Q, q = problems(3, 2, 3)
     mu = np.array([[0.0, 0.1], [0.2, 0.3], [0.4, 0.5]])

@@ -177,35 +177,6 @@ def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
     )
 
 
-@pytest.mark.slow
-def test_problems_of_plugins_are_checked(tmp_path):
-    written(
-        tmp_path,
-        """
-import numpy as np
-from contactopt import InterfaceProblem
-from contactopt.benchmark import problem
-
-@problem
-def is_none():
-    return None
-
-@problem
-def exits():
-    raise SystemExit(0)
-""",
-        "mine.py",
-    )
-    families = "".join(f'[[problems]]\nfamily = "{name}"\n' for name in ("is_none", "exits"))
-    table = run(
-        tmp_path,
-        f'name = "x"\nplugins = ["mine.py"]\n{families}{SCENE}[[methods]]\nmethod = "auto"\n',
-    )
-    status = dict(zip(table["family"], table["status"]))
-    assert status == {"is_none": "not_built", "exits": "not_built", "punch-2d": "solved"}
-    assert table["message"].str.len().min() > 0
-
-
 @pytest.mark.parametrize(
     ("source", "words"),
     [
@@ -273,20 +244,9 @@ def test_absurd_numbers_are_refused_in_one_sentence_before_any_work(
 
 
 def test_absurd_numbers_of_workers(tmp_path, capsys):
+    given = ["bench", str(written(tmp_path, SMALL)), "--out", str(tmp_path / "out"), "--jobs"]
     for jobs in ("0", "-1"):
-        assert (
-            main(
-                [
-                    "bench",
-                    str(written(tmp_path, SMALL)),
-                    "--jobs",
-                    jobs,
-                    "--out",
-                    str(tmp_path / "out"),
-                ]
-            )
-            == 2
-        )
+        assert main([*given, jobs]) == 2
         one_line(capsys.readouterr().err, "jobs")
 
 

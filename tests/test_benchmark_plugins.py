@@ -227,17 +227,26 @@ def impossible():
 @problem
 def deadly():
     os.abort()
+
+@problem
+def is_none():
+    return None
+
+@problem
+def exits():
+    raise SystemExit(0)
 """,
         "bad.py",
     )
-    text = 'plugins = ["bad.py"]' + SMALL.replace(
-        'scene = "punch-2d"\nmu = [0.2, 0.5]\nelements = 4', 'family = "impossible"'
-    )
-    text = text.replace("[[methods]]", '[[problems]]\nfamily = "deadly"\n[[methods]]')
-    table = run(tmp_path, text)
-    rows = table[table["family"].isin(["impossible", "deadly"])]
-    assert len(rows) == 8 and set(rows["status"]) == {"not_built"}
-    assert rows["message"].str.contains("no such thing|SIGABRT").all()
+    names = ["impossible", "deadly", "is_none", "exits"]
+    families = "".join(f'[[problems]]\nfamily = "{name}"\n' for name in names)
+    text = SMALL.replace("[[methods]]", families + "[[methods]]")
+    table = run(tmp_path, 'plugins = ["bad.py"]' + text)
+    rows = table[table["family"].isin(names)]
+    assert len(rows) == 16 and set(rows["status"]) == {"not_built"}
+    assert rows["message"].str.len().min() > 0
+    assert rows["message"].str.contains("no such thing|SIGABRT").sum() == 8
+    assert set(table["status"].drop(rows.index)) == {"solved"}
 
 
 @pytest.mark.slow

@@ -72,32 +72,6 @@ def test_one_contact_is_exact():
     assert "if and only if mu < 0.6667" in str(report)
 
 
-@pytest.mark.parametrize("name,method", BOTH)
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_one_contact_against_the_iterations(name, method, way):
-    """Within 1e-3 of the threshold they cease to approach a slipping solution and leave it."""
-    problem = one_contact((0.0, 0.0), 1.0)
-    threshold = getattr(diagnose(problem).guaranteed, name)
-    for factor in (0.999, 1.001):
-        assert rate(*slipping(problem, factor * threshold, way), method) == pytest.approx(
-            factor, abs=1e-4
-        )
-
-
-@pytest.mark.parametrize("nu", [0.0, 0.2, 0.3, 0.45])
-def test_one_triangle(nu):
-    """Constant-strain triangle, contact node (0, 0), clamped at (1, 0) and (0, 1), plane strain:
-    mu* = 3 - 4 nu.
-    """
-    D = np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]]) / (
-        (1 + nu) * (1 - 2 * nu)
-    )
-    # strain of the unit displacements of the node
-    B = np.array([[-1.0, 0.0], [0.0, -1.0], [-1.0, -1.0]])
-    report = diagnose(InterfaceProblem(np.linalg.inv(B.T @ D @ B / 2), np.zeros((1, 2)), 0.3))
-    assert report.exact and report.guaranteed.unique == pytest.approx(3 - 4 * nu, abs=1e-10)
-
-
 @pytest.mark.parametrize("shear", [0.5, 0.9])  # just held, and slides
 def test_a_plate_that_determines_all_forces(shear):
     problem = InterfaceProblem(np.eye(2), [[0.0, 0.0]], 0.5, np.eye(2), [-1.0, shear])
@@ -176,12 +150,6 @@ def test_local_thresholds_of_one_contact():
     problem = one_contact((0.8, 1.0), 1.0)
     slip = next(s for s in all_solutions(problem) if 0 < s.reactions[0, 0] < 0.9)
     assert diagnose(problem, slip).local.singular == pytest.approx(2 / 3)
-
-
-def test_all_open():
-    problem = InterfaceProblem(np.eye(4), np.ones((2, 2)), 0.5)
-    local = diagnose(problem, solve(problem)).local
-    assert local.open == 2 and local.alternating_rate == 0 and local.singular == np.inf
 
 
 def test_local_turns_with_the_direction_of_slip_in_3d():
@@ -267,7 +235,3 @@ def test_units_do_not_matter(punch):
 def test_a_solution_of_something_else_is_refused(punch):
     with pytest.raises(InputError, match="needs a solution of this problem"):
         diagnose(changed(punch, 0.05), solve(punch))
-
-
-def forces(problem: InterfaceProblem) -> list[np.ndarray]:
-    return [s.reactions for s in all_solutions(problem)]

@@ -157,20 +157,6 @@ def test_polygons_converge_to_discs_from_inside(problem):
         models.tangential(problem, 2)
 
 
-@pytest.mark.parametrize("problem", ["solid"], indirect=True)
-@pytest.mark.parametrize("name", ["tresca", "associated", "acary_cadoux"])
-def test_pyramids_make_a_qp_with_the_same_names(name, problem):
-    program = getattr(models, name)(problem, facets=12)
-    for key, value in (("g", 0.2), ("s", 0.3)):
-        if key in program.parameters:
-            program.parameters[key].value = np.full(problem.contacts, value)
-    m, r = solved(program).multipliers, program.variables["r"].value
-    u_n, u_t, _ = state(problem, r.reshape(problem.q.shape), m["approach"])
-    assert np.allclose(m["gap"], u_n, atol=1e-5) and np.allclose(m["slip"], u_t, atol=1e-5)
-    assert np.abs(u_t).max() > 0.1
-    assert program.problem.is_qp()
-
-
 def test_plate_that_is_dragged_belongs_to_the_tangential_program():
     V = np.kron(np.ones((4, 1)), np.eye(2))
     problem = InterfaceProblem(np.diag(np.arange(1.0, 9.0)), np.zeros((4, 2)), 0.5, V, [-4.0, 0.9])
