@@ -208,6 +208,8 @@ def test_friction_may_be_a_function_of_the_place():
     ):
         with pytest.raises(InputError, match="friction"):
             reduce(replace(scene, mu=wrong))
+    with pytest.raises(InputError, match="one number or one per contact"):
+        reduce(replace(scene, mu=[0.1, 0.2]))
 
 
 @dataclass(frozen=True)

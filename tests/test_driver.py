@@ -117,19 +117,6 @@ def test_the_papers_criterion_is_recorded_and_can_stop_but_not_certify():
     assert all({"residual", "change", "seconds"} <= set(h) for h in loose.history)
 
 
-def test_pulling_bodies_apart_is_refused(punch):
-    pulled = InterfaceProblem(punch.Q, punch.q, punch.mu, punch.V, -punch.s)
-    with pytest.raises(InputError, match="pulls the bodies apart"):
-        solve(pulled)
-
-
-def test_unloaded_and_open_contacts():
-    at_rest = solve(InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3))
-    apart = solve(InterfaceProblem(np.eye(2), [[1.0, 0.4]], 0.3))
-    assert at_rest.solved and apart.solved
-    assert not np.any(at_rest.reactions) and not np.any(apart.reactions)
-
-
 @pytest.mark.parametrize(
     "bad", [dict(tol=0), dict(tol=np.nan), dict(max_iterations=0), dict(change_tol=-1.0)]
 )

@@ -31,16 +31,6 @@ def cattaneo(distance: np.ndarray, a: float, c: float) -> tuple[np.ndarray, np.n
     return p, 0.5 * (p - c / a * np.sqrt(np.maximum(0.0, 1 - (distance / c) ** 2)))
 
 
-@pytest.mark.parametrize("c", [0.613, 0.3, 0.95])
-def test_edges_of_exact_tractions_in_a_line(c):
-    x = np.linspace(-1.25, 1.25, 101)
-    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
-    p, q = cattaneo(np.abs(x), 0.987, c)
-    r = 0.025 * np.stack([p, -q], axis=1)
-    assert contact_edge(scene, problem, r) == pytest.approx(0.987, rel=1e-9)
-    assert stick_edge(scene, problem, r)[0] == pytest.approx(c, rel=1e-9)
-
-
 @pytest.mark.parametrize("c", [0.613, 0.8])
 def test_forces_on_a_graded_line_act_beside_its_nodes(c):
     """Each is the integral of the traction times a hat, whose centroid is not at the node."""

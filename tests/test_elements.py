@@ -7,7 +7,7 @@ import meshio
 import numpy as np
 import pytest
 import skfem
-from conftest import MATERIAL, block, two_blocks
+from conftest import MATERIAL, two_blocks
 from scipy.sparse.linalg import spsolve
 from skfem.helpers import ddot, sym_grad, trace
 
@@ -160,25 +160,6 @@ def test_rigid_motions_of_curved_elements_cost_nothing():
         turn[body.unknowns[0]], turn[body.unknowns[1]] = -body.locations[1], body.locations[0]
         assert body.unknowns.shape[1] == nodes
         assert np.abs(body.A @ turn).max() < 1e-12 * abs(body.A).max()
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_cutting_into_simplices_keeps_volume_and_boundaries(kind):
-    mesh = block(kind, -2, 0)
-    cut = simplices(mesh)
-    assert cut.nelements == mesh.nelements * (6 if kind == "solid" else 2)
-    assert set(cut.boundaries) == set(mesh.boundaries)
-    for name in mesh.boundaries:
-        shapes = (
-            (skfem.ElementHex1, skfem.ElementTetP1)
-            if kind == "solid"
-            else (skfem.ElementQuad1, skfem.ElementTriP1)
-        )
-        areas = [
-            float(np.sum(skfem.FacetBasis(m, e(), facets=m.boundaries[name]).dx))
-            for m, e in zip((mesh, cut), shapes)
-        ]
-        assert areas[0] == pytest.approx(areas[1])
 
 
 def test_cells_with_corners_in_any_order_are_cut_into_tetrahedra_that_fit():

@@ -216,15 +216,6 @@ def test_friction_holds_up_to_its_limit(side, holds):
         assert solve(problem, tol=1e-9).solved
 
 
-@pytest.mark.parametrize("side,holds", [(0.32, True), (0.35, False)])
-def test_a_tower_stands_up_to_its_limit(side, holds):
-    """Three blocks of width one: the resultant leaves the base at side / weight = width / height =
-    1 / 3.
-    """
-    problem = reduce_bodies(stack(3, side=side, mu=5.0)).problem
-    assert (escape(problem) is None) == holds
-
-
 @pytest.mark.parametrize("law", ["tied", "bilateral", "coulomb"])
 @pytest.mark.parametrize("cells", [3, 4])
 def test_a_scene_that_nothing_holds_is_solved_or_told_so(law, cells):

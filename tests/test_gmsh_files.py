@@ -114,35 +114,6 @@ def test_other_versions_of_gmsh_files_are_named(tmp_path):
             load_mesh(tmp_path / f"{name}.msh")
 
 
-def test_groups_of_med_files_keep_their_names(gmsh, tmp_path):
-    pytest.importorskip("h5py")
-    disc_in_plate(gmsh, tmp_path / "a.msh", 3, 2)
-    gmsh.write(str(tmp_path / "a.med"))
-    for name in ("disc", "plate"):
-        own, other = (load_mesh(tmp_path / file, name) for file in ("a.msh", "a.med"))
-        assert set(own.boundaries) == set(other.boundaries) == {"rim"}
-        assert other.nelements == own.nelements
-        assert volume(other) == pytest.approx(volume(own), rel=1e-12)
-        assert flux(other, "rim") == pytest.approx(flux(own, "rim"), rel=1e-12)
-
-
-@pytest.mark.parametrize("version", [2.2, 4.1])
-def test_damaged_binary_files_of_second_order_end_in_a_sentence(gmsh, tmp_path, version):
-    gmsh.option.setNumber("Mesh.Binary", 1.0)
-    path = disc_in_plate(gmsh, tmp_path / "a.msh", 2, 2, version=version)
-    good, random = path.read_bytes(), np.random.default_rng(int(10 * version))
-    assert load_mesh(path, "disc").boundaries["rim"].size
-    for _ in range(4):
-        data = bytearray(good)
-        for place in random.integers(60, len(data), 4):
-            data[place] = random.integers(256)
-        path.write_bytes(data)
-        try:
-            load_mesh(path, "disc")
-        except InputError as error:
-            assert "\n" not in str(error)
-
-
 @pytest.mark.parametrize("version", ["2.2", "4.1"])
 def test_binary_gmsh_files_are_read_as_text_ones_and_damage_ends_in_one_sentence(tmp_path, version):
     import gmsh

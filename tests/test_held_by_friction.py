@@ -17,8 +17,6 @@ from contactopt import (
 )
 from contactopt.derivatives.interface import sensitivity
 from contactopt.methods import Repeated
-from contactopt.methods.kernels.balance import project_balanced
-from contactopt.problem.cones import disc_derivative
 
 
 def held(dim, mu, seed=0, turn=0.0, unit=1.0, slope=0.0):
@@ -65,20 +63,6 @@ def test_the_same_answer_as_by_pivoting_turned_and_in_other_units():
         assert np.allclose(mine.multipliers, pivots.multipliers, atol=1e-6)
         turned = solve(held(2, mu, turn=1.1, unit=1e-6), tol=1e-11)
         assert np.allclose(turned.reactions, 1e6 * mine.reactions, atol=1e-2)
-
-
-def test_a_weighted_median_is_found_exactly():
-    """sum g_i |c_i - x| is least at the weighted median."""
-    rng = np.random.default_rng(4)
-    c, g = rng.normal(size=21), 1e-8 * rng.uniform(1, 2, 21)
-    order = np.argsort(c)
-    median = c[order[np.searchsorted(np.cumsum(g[order]), g.sum() / 2)]]
-    V = np.ones((21, 1))
-    r, x = project_balanced(
-        lambda y: disc_derivative(y, g), c[:, None], V, np.zeros(1), 1.0, np.zeros(1)
-    )
-    assert x[0] == pytest.approx(median, abs=1e-7) and abs(r.sum()) < 1e-14
-    assert np.sum(np.abs(r[:, 0]) < g) == 1
 
 
 class Turning:

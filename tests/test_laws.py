@@ -30,12 +30,10 @@ from contactopt.problem.laws import (
     Law,
     Mixed,
     Orthotropic,
-    Place,
     Tied,
     Tresca,
     find_law,
     join,
-    make_law,
 )
 
 ALL = {
@@ -138,13 +136,6 @@ def test_every_method_that_says_so_solves_the_law(name, method):
     assert solution.solved and worst(problem, solution, [name] * 6) < 100 * tol
 
 
-def test_the_refusal_names_methods_that_do_solve_the_law():
-    problem = random_problem(Associated(0.3))
-    assert "relaxation" in solvers_of(problem.law) and "tresca" not in solvers_of(problem.law)
-    for name in set(solvers_of(problem.law)) - {"lemke"}:
-        assert solve(problem, name, tol=1e-4, max_iterations=5000).solved
-
-
 @pytest.mark.parametrize("dim", [2, 3])
 def test_tresca_is_the_program_in_cvxpy(dim):
     problem = random_problem(Tresca(np.linspace(0.05, 0.6, 6)), dim=dim)
@@ -245,18 +236,6 @@ def test_every_contact_may_have_its_own_law(dim):
         solve(problem, "nsgs")
 
 
-def test_contacts_that_do_not_feel_each_other_are_solved_on_their_own():
-    laws = [Coulomb([0.3, 0.6]), Tresca([0.2])]
-    parts = [random_problem(law, k=law.contacts, dim=2, seed=i) for i, law in enumerate(laws)]
-    Q = np.zeros((6, 6))
-    Q[:4, :4], Q[4:, 4:] = parts[0].Q, parts[1].Q
-    whole = InterfaceProblem(
-        Q, np.vstack([p.q for p in parts]), join([(laws[0], [0, 1]), (laws[1], [2])])
-    )
-    apart = np.vstack([solve(p, tol=1e-12).reactions for p in parts])
-    assert np.allclose(solve(whole, tol=1e-12).reactions, apart, atol=1e-9)
-
-
 def test_selection_and_joining_keep_every_contact_with_its_law():
     rng = np.random.default_rng(3)
     y = rng.normal(size=(5, 3))
@@ -279,14 +258,6 @@ def test_selection_and_joining_keep_every_contact_with_its_law():
     for overlapping in ([0], [2]):
         with pytest.raises(InputError, match="every contact needs exactly one law"):
             join([(Coulomb([0.1]), [0]), (Tresca([0.1]), overlapping)])
-
-
-def test_status_of_the_contacts():
-    law = Coulomb(np.full(4, 0.5))
-    r = np.array([[2.0, 1.0], [2.0, 0.9], [1e-14, 0.0], [1.0, -0.5]])
-    assert list(law.pressed(r)) == [True, True, False, True]
-    assert list(law.sticking(r)) == [False, True, False, False]
-    assert list(law.pressed(r) & ~law.sticking(r)) == [True, False, False, True]
 
 
 def test_replacing_other_data_keeps_the_law():
@@ -328,21 +299,6 @@ def test_diagnosis_needs_a_friction_coefficient():
     for law in (Tresca(0.3), Associated(0.3)):
         with pytest.raises(InputError, match="needs Coulomb's law"):
             diagnose(random_problem(law))
-
-
-def test_friction_of_the_place():
-    scene = scenes.flat_punch(2, elements=6, mu=lambda places: 0.1 + 0.01 * np.abs(places[0]))
-    problem = reduce(scene)
-    assert (
-        np.allclose(problem.mu, 0.1 + 0.01 * np.abs(problem.coordinates[0]))
-        and np.ptp(problem.mu) > 0.1
-    )
-    same = reduce(replace(scene, mu=problem.mu))
-    assert np.allclose(solve(same).reactions, solve(problem).reactions)
-    with pytest.raises(InputError, match="one number or one per contact"):
-        reduce(replace(scene, mu=[0.1, 0.2]))
-    with pytest.raises(InputError, match="one number or one per contact"):
-        make_law("coulomb", lambda x: x, Place(np.ones(3), np.zeros((3, 2, 2))), np.zeros((2, 3)))
 
 
 def test_a_law_is_one_file_and_one_line(monkeypatch):

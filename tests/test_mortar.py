@@ -101,23 +101,6 @@ def check_exact(m, upper: Faces, lower: Faces) -> None:
     assert np.all(m.areas > 0)
 
 
-@pytest.mark.parametrize("weight", [(0.7, False), (2 * np.pi, True)])
-@pytest.mark.parametrize("own", SIDES)
-@pytest.mark.parametrize("ratio", RATIOS)
-@pytest.mark.parametrize("degree,cut", [(1, False), (2, False), (2, True)])
-def test_lines_pass_on_linear_fields_and_uniform_pressure(degree, cut, ratio, own, weight):
-    upper = line(grid(ratio[0], power=1.3), degree, False, cut, weight=weight)
-    lower = line(grid(ratio[1]), degree, True, cut, weight=weight)
-    m = mortar(upper, lower, own)
-    check_exact(m, upper, lower)
-    assert np.allclose(m.normals, [[0], [1]], atol=1e-14)
-    if own is None:
-        assert m.own == 1  # more contacts, or as many
-        assert mortar(replace(lower, turn=-lower.turn), replace(upper, turn=-upper.turn)).own == (
-            ratio[0] == ratio[1]
-        )
-
-
 @pytest.mark.parametrize("own", SIDES)
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("cuts", CUTS)

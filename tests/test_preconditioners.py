@@ -9,7 +9,6 @@ from scipy.sparse.linalg import LinearOperator
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce, scenes
 from contactopt.meshes.structured import graded, rename, tensor_mesh
-from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.preconditioners import (
     PRECONDITIONERS,
     deflated,
@@ -237,15 +236,4 @@ def test_a_grid_may_lie_at_any_angle_in_its_chart(name, degrees):
     expected = turn @ P @ turn.T
     assert np.allclose(
         preconditioner(moved, name) @ np.eye(len(Q)), expected, atol=1e-8 * np.abs(P).max()
-    )
-
-
-def test_going_on_without_a_preconditioner_is_said(caplog):
-    ragged = InterfaceProblem(
-        np.eye(9), np.zeros((3, 3)), 0.1, coordinates=np.array([[0.0, 1, 2], [0, 1, 3]])
-    )
-    with caplog.at_level("INFO", logger="contactopt"):
-        P = model_of(ragged)
-    assert "no preconditioner fits these contacts" in caplog.text and np.array_equal(
-        P @ np.arange(9.0), np.arange(9.0)
     )
