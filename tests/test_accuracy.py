@@ -254,18 +254,13 @@ def test_command_line(tmp_path, capsys):
     assert "NaN" not in (tmp_path / "summary.json").read_text()
 
 
-@pytest.mark.parametrize(
-    "changes,words",
-    [
-        ({"accuracy": 0.1}, "accuracy and quantity belong together"),
-        ({"quantity": "energy"}, "accuracy and quantity belong together"),
-        (
-            {"accuracy": 0.1, "quantity": "noise"},
-            "choose from pressure.*, width.*, approach, stick.*, energy",
-        ),
-        ({"accuracy": 0.0, "quantity": "energy"}, "the accuracy must be a finite number"),
-    ],
-)
+@pytest.mark.parametrize("changes,words", [
+    ({"accuracy": 0.1}, "accuracy and quantity belong together"),
+    ({"quantity": "energy"}, "accuracy and quantity belong together"),
+    ({"accuracy": 0.1, "quantity": "noise"},
+     "choose from pressure.*, width.*, approach, stick.*, energy"),
+    ({"accuracy": 0.0, "quantity": "energy"}, "the accuracy must be a finite number"),
+])  # fmt: skip
 def test_bad_input(changes, words):
     with pytest.raises(InputError, match=words):
         run("punch-2d", **changes)

@@ -241,38 +241,28 @@ def test_tables_of_one_pair_are_those_of_the_whole():
     assert pair["force"][1] == pytest.approx(100.0)
 
 
-@pytest.mark.parametrize(
-    "change,message",
-    [
-        (
-            lambda s: replace(s, contacts=(Contact("block0", "block7", 0.1),)),
-            "'block7' that is not there.*floor, block0",
-        ),
-        (lambda s: replace(s, bodies=(*s.bodies, s.bodies[1])), "two bodies are named 'block0'"),
-        (lambda s: replace(s, contacts=s.contacts[:1]), "body 'block1' belongs to no contact"),
-        (lambda s: replace(s, contacts=(*s.contacts, s.contacts[0])), "given twice"),
-        (
-            lambda s: replace(s, contacts=(*s.contacts, Contact("block0:top", "block1", 0.1))),
-            "'block1-block0.top' and 'block0.top-block1' join the same two surfaces",
-        ),
-        (
-            lambda s: replace(
-                s, contacts=(*s.contacts, Contact("block1:bottom", "block0:top", 0.0, law="tied"))
-            ),
-            "join the same two surfaces.*keep one of them",
-        ),
-        (lambda s: replace(s, contacts=()), "belong together"),
-        (lambda s: replace(s, mu=0.3), "not both"),
-        (lambda s: Contact("a", "a:top", 0.1), "'a' cannot touch itself"),
-        (lambda s: Contact("a", 3, 0.1), "by text"),
-        (lambda s: Contact("a", "b", -0.1), "must be a finite number at least 0"),
-        (lambda s: Contact("a", "b", 0.1, law="glue"), "unknown law"),
-        (lambda s: Contact("a", "b", 0.1, carrier="a"), "carrier"),
-        (lambda s: Scene("s", s.bodies[1], s.bodies[2]), "give upper, lower and mu"),
-        (lambda s: replace(s, contacts=("block0", "block1")), "must be Contact objects"),
-        (lambda s: Part("a/b", unit_block("plane-strain", 0, 1), SOFT), "cannot name a file"),
-    ],
-)
+@pytest.mark.parametrize("change,message", [
+    (lambda s: replace(s, contacts=(Contact("block0", "block7", 0.1),)),
+     "'block7' that is not there.*floor, block0"),
+    (lambda s: replace(s, bodies=(*s.bodies, s.bodies[1])), "two bodies are named 'block0'"),
+    (lambda s: replace(s, contacts=s.contacts[:1]), "body 'block1' belongs to no contact"),
+    (lambda s: replace(s, contacts=(*s.contacts, s.contacts[0])), "given twice"),
+    (lambda s: replace(s, contacts=(*s.contacts, Contact("block0:top", "block1", 0.1))),
+     "'block1-block0.top' and 'block0.top-block1' join the same two surfaces"),
+    (lambda s: replace(s,
+     contacts=(*s.contacts, Contact("block1:bottom", "block0:top", 0.0, law="tied"))),
+     "join the same two surfaces.*keep one of them"),
+    (lambda s: replace(s, contacts=()), "belong together"),
+    (lambda s: replace(s, mu=0.3), "not both"),
+    (lambda s: Contact("a", "a:top", 0.1), "'a' cannot touch itself"),
+    (lambda s: Contact("a", 3, 0.1), "by text"),
+    (lambda s: Contact("a", "b", -0.1), "must be a finite number at least 0"),
+    (lambda s: Contact("a", "b", 0.1, law="glue"), "unknown law"),
+    (lambda s: Contact("a", "b", 0.1, carrier="a"), "carrier"),
+    (lambda s: Scene("s", s.bodies[1], s.bodies[2]), "give upper, lower and mu"),
+    (lambda s: replace(s, contacts=("block0", "block1")), "must be Contact objects"),
+    (lambda s: Part("a/b", unit_block("plane-strain", 0, 1), SOFT), "cannot name a file"),
+])  # fmt: skip
 def test_wrong_input_is_refused(change, message):
     with pytest.raises(InputError, match=message):
         change(stack(2))

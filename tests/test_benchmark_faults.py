@@ -177,22 +177,14 @@ def test_a_hanging_plugin_costs_about_its_time_limit(tmp_path):
     )
 
 
-@pytest.mark.parametrize(
-    ("source", "words"),
-    [
-        ("raise SystemExit(3)\n", "SystemExit"),
-        ("from contactopt.benchmark import method\nmethod(3)\n", "must be a function"),
-        ("from contactopt.benchmark import method\nmethod(len, name=3)\n", "name"),
-        (
-            (
-                "from contactopt.benchmark import"
-                " problem\n@problem(name='half_plane')\ndef f(): pass\n"
-            ),
-            "half_plane",
-        ),
-        ("def (", "SyntaxError"),
-    ],
-)
+@pytest.mark.parametrize(("source", "words"), [
+    ("raise SystemExit(3)\n", "SystemExit"),
+    ("from contactopt.benchmark import method\nmethod(3)\n", "must be a function"),
+    ("from contactopt.benchmark import method\nmethod(len, name=3)\n", "name"),
+    (("from contactopt.benchmark import" " problem\n@problem(name='half_plane')\ndef f(): pass\n"),
+     "half_plane"),
+    ("def (", "SyntaxError"),
+])  # fmt: skip
 def test_plugin_files_that_cannot_be_loaded_are_one_sentence(tmp_path, source, words):
     written(tmp_path, source, "mine.py")
     with pytest.raises(InputError, match=words):
@@ -202,36 +194,31 @@ def test_plugin_files_that_cannot_be_loaded_are_one_sentence(tmp_path, source, w
 # Numbers
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("repeats = 2", "repeats = 1000000000", "whole number"),
-        ("repeats = 2", "repeats = 100000", "runs"),
-        ("repeats = 2", "repeats = 2\nseed = 4294967296", "seed"),
-        ("repeats = 2", f"repeats = 2\nseed = -{10**30}", "seed"),
-        ("repeats = 2", "repeats = 2\nmax_iterations = 1e9", "max_iterations"),
-        ("repeats = 2", 'repeats = 2\nsettings = ["mid", "mid"]', "twice"),
-        ("repeats = 2", "repeats = 2\nplugins = [3]", "plugins"),
-        ("repeats = 2", "repeats = 2\nplugins = {a = 1}", "plugins"),
-        ("limit = 10.0", "limit = 1e300", "time_limit"),
-        ("limit = 10.0", "limit = inf", "time_limit"),
-        ("limit = 10.0", 'limit = "long"', "time_limit"),
-        ("limit = 10.0", "limit = 10.0\nmemory_limit = 1e-9", "memory_limit"),
-        ("limit = 10.0", "limit = 10.0\nmemory_limit = 1e30", "memory_limit"),
-        ("mu = [0.2, 0.5]", "mu = {from = 0.1, to = 1.0, steps = 1000000000}", "runs"),
-        ("mu = [0.2, 0.5]", "mu = {from = 0.1, to = nan, steps = 3}", "'to'"),
-        ("mu = [0.2, 0.5]", 'mu = {from = "a", to = 1.0, steps = 3}', "'from'"),
-        ("mu = [0.2, 0.5]", "mu = [[0.2], 0.5]", "'mu'"),
-        ("mu = [0.2, 0.5]", "mu = 2020-01-01", "'mu'"),
-        ("elements = 4", f"elements = {10**30}", "elements"),
-        (
-            "bodies = 4",
-            "bodies = {from = 2, to = 900, steps = 800}\nseed = {from = 1, to = 999, steps = 900}",
-            "runs",
-        ),
-        ('["auto", "nsgs"]', "[3]", "name"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("repeats = 2", "repeats = 1000000000", "whole number"),
+    ("repeats = 2", "repeats = 100000", "runs"),
+    ("repeats = 2", "repeats = 2\nseed = 4294967296", "seed"),
+    ("repeats = 2", f"repeats = 2\nseed = -{10**30}", "seed"),
+    ("repeats = 2", "repeats = 2\nmax_iterations = 1e9", "max_iterations"),
+    ("repeats = 2", 'repeats = 2\nsettings = ["mid", "mid"]', "twice"),
+    ("repeats = 2", "repeats = 2\nplugins = [3]", "plugins"),
+    ("repeats = 2", "repeats = 2\nplugins = {a = 1}", "plugins"),
+    ("limit = 10.0", "limit = 1e300", "time_limit"),
+    ("limit = 10.0", "limit = inf", "time_limit"),
+    ("limit = 10.0", 'limit = "long"', "time_limit"),
+    ("limit = 10.0", "limit = 10.0\nmemory_limit = 1e-9", "memory_limit"),
+    ("limit = 10.0", "limit = 10.0\nmemory_limit = 1e30", "memory_limit"),
+    ("mu = [0.2, 0.5]", "mu = {from = 0.1, to = 1.0, steps = 1000000000}", "runs"),
+    ("mu = [0.2, 0.5]", "mu = {from = 0.1, to = nan, steps = 3}", "'to'"),
+    ("mu = [0.2, 0.5]", 'mu = {from = "a", to = 1.0, steps = 3}', "'from'"),
+    ("mu = [0.2, 0.5]", "mu = [[0.2], 0.5]", "'mu'"),
+    ("mu = [0.2, 0.5]", "mu = 2020-01-01", "'mu'"),
+    ("elements = 4", f"elements = {10**30}", "elements"),
+    ("bodies = 4",
+     "bodies = {from = 2, to = 900, steps = 800}\nseed = {from = 1, to = 999, steps = 900}",
+     "runs"),
+    ('["auto", "nsgs"]', "[3]", "name"),
+])  # fmt: skip
 def test_absurd_numbers_are_refused_in_one_sentence_before_any_work(
     tmp_path, capsys, old, new, words
 ):

@@ -68,27 +68,18 @@ def test_normals_of_a_closed_surface_sum_to_zero():
     assert np.all(np.sum(body.trace.normals * body.points, axis=0) > 0)
 
 
-@pytest.mark.parametrize(
-    "kind,supports,motions",
-    [
-        (
-            "plane-strain",
-            (),
-            ["translation along x", "translation along y", "rotation in the x-y plane"],
-        ),
-        ("plane-strain", ("side0",), ["translation along y"]),
-        ("plane-strain", ({"top": "y"},), ["translation along x"]),
-        ("plane-strain", ({"bottom": "xy"},), []),
-        ("solid", ("side0", "side1"), ["translation along z"]),
-        (
-            "solid",
-            ({"top": "z"},),
-            ["translation along x", "translation along y", "rotation in the x-y plane"],
-        ),
-        ("axisymmetric", ("side0",), ["translation along z"]),
-        ("axisymmetric", (), ["translation along z"]),
-    ],
-)
+@pytest.mark.parametrize("kind,supports,motions", [
+    ("plane-strain", (),
+     ["translation along x", "translation along y", "rotation in the x-y plane"]),
+    ("plane-strain", ("side0",), ["translation along y"]),
+    ("plane-strain", ({"top": "y"},), ["translation along x"]),
+    ("plane-strain", ({"bottom": "xy"},), []),
+    ("solid", ("side0", "side1"), ["translation along z"]),
+    ("solid", ({"top": "z"},),
+     ["translation along x", "translation along y", "rotation in the x-y plane"]),
+    ("axisymmetric", ("side0",), ["translation along z"]),
+    ("axisymmetric", (), ["translation along z"]),
+])  # fmt: skip
 def test_motions_that_nothing_holds_are_found(kind, supports, motions):
     """They strain nothing, and the fixing unknowns make the stiffness definite."""
     components = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[kind]

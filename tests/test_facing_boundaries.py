@@ -106,21 +106,14 @@ def test_the_command_lists_the_pairs(tmp_path, capsys):
     assert "block.y--floor.y+" in told and "block.x+-wall.x-" in told
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        (
-            "mu = 0.4",
-            "mu = 0.4\ndistance = 0.001",
-            "face each other within 0.001 mm; give a larger",
-        ),
-        ("mu = 0.4", "", "'mu' is missing"),
-        ('"auto"', '"all"', "there is no contacts 'all'; choose from auto"),
-        ("mu = 0.4", "mu = -0.4", "must be a finite number at least 0"),
-        ("mu = 0.4", "mu = 0.4\n[bodies.rigid]\nrigid = {}", "'rigid' has none"),
-        ("mu = 0.4", "mu = 0.4\ndistance = 0.015", "'wall' belongs to no contact"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("mu = 0.4", "mu = 0.4\ndistance = 0.001", "face each other within 0.001 mm; give a larger"),
+    ("mu = 0.4", "", "'mu' is missing"),
+    ('"auto"', '"all"', "there is no contacts 'all'; choose from auto"),
+    ("mu = 0.4", "mu = -0.4", "must be a finite number at least 0"),
+    ("mu = 0.4", "mu = 0.4\n[bodies.rigid]\nrigid = {}", "'rigid' has none"),
+    ("mu = 0.4", "mu = 0.4\ndistance = 0.015", "'wall' belongs to no contact"),
+])  # fmt: skip
 def test_what_cannot_be_found_is_told_in_a_sentence(tmp_path, old, new, words):
     path = tmp_path / "shelves.toml"
     path.write_text(TWO_SHELVES.replace(old, new))

@@ -100,24 +100,18 @@ def damaged(change):
     return make
 
 
-@pytest.mark.parametrize(
-    "make,words",
-    [
-        (lambda path: path.write_text("not hdf5"), "usable FCLib file"),
-        (lambda path: None, "usable FCLib file"),
-        (lambda path: h5py.File(path, "w").close(), "neither"),
-        (damaged(lambda f: f["fclib_global"].__delitem__("M")), "usable FCLib file"),
-        (damaged(lambda f: f["fclib_global/spacedim"].__setitem__(0, 5)), "spacedim is 5"),
-        (
-            damaged(lambda f: f["fclib_global/vectors/mu"].__setitem__(0, -1.0)),
-            "must not be negative",
-        ),
-        (damaged(lambda f: f["fclib_global/vectors/w"].__setitem__(0, np.nan)), "not finite"),
-        (damaged(lambda f: f["fclib_global/H/i"].__setitem__(0, 77)), "usable FCLib file"),
-        (damaged(lambda f: f["fclib_global/M/nz"].__setitem__(0, -7)), "storage"),
-        (damaged(lambda f: f["fclib_global/M/x"].__setitem__(0, 0.0)), "usable FCLib file"),
-    ],
-)
+@pytest.mark.parametrize("make,words", [
+    (lambda path: path.write_text("not hdf5"), "usable FCLib file"),
+    (lambda path: None, "usable FCLib file"),
+    (lambda path: h5py.File(path, "w").close(), "neither"),
+    (damaged(lambda f: f["fclib_global"].__delitem__("M")), "usable FCLib file"),
+    (damaged(lambda f: f["fclib_global/spacedim"].__setitem__(0, 5)), "spacedim is 5"),
+    (damaged(lambda f: f["fclib_global/vectors/mu"].__setitem__(0, -1.0)), "must not be negative"),
+    (damaged(lambda f: f["fclib_global/vectors/w"].__setitem__(0, np.nan)), "not finite"),
+    (damaged(lambda f: f["fclib_global/H/i"].__setitem__(0, 77)), "usable FCLib file"),
+    (damaged(lambda f: f["fclib_global/M/nz"].__setitem__(0, -7)), "storage"),
+    (damaged(lambda f: f["fclib_global/M/x"].__setitem__(0, 0.0)), "usable FCLib file"),
+])  # fmt: skip
 def test_malformed_files_are_refused_by_name(make, words, tmp_path):
     make(tmp_path / "bad.hdf5")
     with pytest.raises(InputError, match=words) as caught:

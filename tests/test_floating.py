@@ -186,23 +186,15 @@ def test_a_scene_that_is_turned_has_the_same_answer(angle):
         assert np.allclose(a.reactions, b.reactions[::-1], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "scene,message",
-    [
-        (stack(2, side=0.6), "body 'block.' slides off .translation along x"),
-        (stack(2, 3, side=0.6, width=3.0), "body 'block.' slides off .translation along x"),
-        (stack(2, weight=-1.0), "no contact holds body 'block.' .translation along y"),
-        (
-            stack(8, side=0.3, width=1.0),
-            "more than the contacts can hold: body 'block.' tips over .rotation in the x-y plane",
-        ),
-        (
-            stack(2, kind="axisymmetric", weight=-1.0),
-            "no contact holds body 'block.' .translation along z",
-        ),
-    ],
-    ids=["slides", "slides-3d", "lifts", "tips", "axis"],
-)
+@pytest.mark.parametrize("scene,message", [
+    (stack(2, side=0.6), "body 'block.' slides off .translation along x"),
+    (stack(2, 3, side=0.6, width=3.0), "body 'block.' slides off .translation along x"),
+    (stack(2, weight=-1.0), "no contact holds body 'block.' .translation along y"),
+    (stack(8, side=0.3, width=1.0),
+     "more than the contacts can hold: body 'block.' tips over .rotation in the x-y plane"),
+    (stack(2, kind="axisymmetric", weight=-1.0),
+     "no contact holds body 'block.' .translation along z"),
+], ids=["slides", "slides-3d", "lifts", "tips", "axis"])  # fmt: skip
 def test_loads_that_nothing_balances_name_body_and_motion(scene, message):
     with pytest.raises(InputError, match=message):
         solve(reduce_bodies(scene).problem)

@@ -222,39 +222,22 @@ def test_the_last_step_of_a_path_is_the_load():
     assert found.interval == pytest.approx((-1.5, 1.5), rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("scene", "load", "factor", "said"),
-    [
-        (slope(0.0, 0.0), "block:left", 0.0, "any block:left"),
-        (slope(support=(Support("right", {"x": 0.0}),)), "block:left", np.inf, "supports bear"),
-        (pressed(), "block:top", np.inf, "below 0 times block:top, and at no larger"),
-        (
-            beneath(0.5),
-            "block:top",
-            np.inf,
-            "below 0.83333 times block:top, and at no larger ... load as given, friction can",
-        ),
-        (
-            beneath(0.65),
-            "block:top",
-            np.inf,
-            "below 1.0833 times block:top, and at no larger ... load as given, they do",
-        ),
-        (slope(0.0, 3.0), "block:left", 4.0, "slide away, tip over or lift off above 4 times"),
-        pytest.param(
-            *(slope(), "block:body_force", np.inf, "friction grows with the load"),
-            marks=pytest.mark.slow,
-        ),
-        (slope(30.0, 0.1), "block:body_force", 0.0, "whatever the factor on block"),
-        (slope(10.0, 0.1), "block:left:x", -0.15033, "At 1, the load as given, they do."),
-        (
-            slope(-30.0, 0.1),
-            "block:left:x",
-            1.1732,
-            "below 0.82679 times it. At 1, the load as given, friction can",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("scene", "load", "factor", "said"), [
+    (slope(0.0, 0.0), "block:left", 0.0, "any block:left"),
+    (slope(support=(Support("right", {"x": 0.0}),)), "block:left", np.inf, "supports bear"),
+    (pressed(), "block:top", np.inf, "below 0 times block:top, and at no larger"),
+    (beneath(0.5), "block:top", np.inf,
+     "below 0.83333 times block:top, and at no larger ... load as given, friction can"),
+    (beneath(0.65), "block:top", np.inf,
+     "below 1.0833 times block:top, and at no larger ... load as given, they do"),
+    (slope(0.0, 3.0), "block:left", 4.0, "slide away, tip over or lift off above 4 times"),
+    pytest.param(*(slope(), "block:body_force", np.inf, "friction grows with the load"),
+     marks=pytest.mark.slow),
+    (slope(30.0, 0.1), "block:body_force", 0.0, "whatever the factor on block"),
+    (slope(10.0, 0.1), "block:left:x", -0.15033, "At 1, the load as given, they do."),
+    (slope(-30.0, 0.1), "block:left:x", 1.1732,
+     "below 0.82679 times it. At 1, the load as given, friction can"),
+])  # fmt: skip
 def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, factor, said):
     found = limit(scene, load)
     assert found.factor == pytest.approx(factor, rel=1e-4), found

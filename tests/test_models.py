@@ -10,14 +10,8 @@ from contactopt.methods.backends.conic import Conic
 from contactopt.problem.laws import Bilateral, Coulomb, Orthotropic
 
 PROGRAMS = (
-    "normal",
-    "penalised",
-    "bilateral",
-    "tangential",
-    "tresca",
-    "associated",
-    "acary_cadoux",
-)
+    "normal", "penalised", "bilateral", "tangential", "tresca", "associated", "acary_cadoux",
+)  # fmt: skip
 
 
 @pytest.fixture(params=["plane", "solid", "no plate"])

@@ -121,21 +121,12 @@ def test_what_spoils_a_symmetry_is_named(scene, reason):
     assert any(reason in note for note in found.notes), found.notes
 
 
-@pytest.mark.parametrize(
-    "scene",
-    [
-        punch(
-            support=(
-                Support("bottom", {"y": 0.0}),
-                Support("left", {"x": 0.1}),
-                Support("right", {"x": -0.1}),
-            )
-        ),
-        punch(loads=(Traction("x+", (0.1, 0.2)), Traction("x-", (-0.1, 0.2)))),
-        punch(mu=lambda x: 0.3 + 0.1 * np.abs(x[0] - 3)),
-    ],
-    ids=["support", "traction", "friction"],
-)
+@pytest.mark.parametrize("scene", [
+    punch(support=(Support("bottom", {"y": 0.0}), Support("left", {"x": 0.1}),
+     Support("right", {"x": -0.1}))),
+    punch(loads=(Traction("x+", (0.1, 0.2)), Traction("x-", (-0.1, 0.2)))),
+    punch(mu=lambda x: 0.3 + 0.1 * np.abs(x[0] - 3)),
+], ids=["support", "traction", "friction"])  # fmt: skip
 def test_pairs_of_images_keep_a_symmetry(scene):
     (half,) = halves(scene)
     one, other = solve_scene(scene, options=TIGHT), solve_scene(half.scene, options=TIGHT)

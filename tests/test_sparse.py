@@ -156,23 +156,17 @@ def test_the_text_format_is_read_in_all_storages(storage, tmp_path):
     assert fclib.read(path).fingerprint == problem.fingerprint
 
 
-@pytest.mark.parametrize(
-    "text,words",
-    [
-        ("3 1", "numbers"),
-        ("4 1 0 4 4", "dimension"),
-        (
-            "2 1000000000000 0 2000000000000 2000000000000 2000000000000 2000000000000 1.0",
-            "numbers",
-        ),
-        ("2 1 0 3 3", "does not fit"),
-        ("2 1 9 2 2 1 1", "storage"),
-        ("2 1 1 2 2 5000000000 1 1 2 2", "numbers"),
-        ("2 1 2 2 2 no matrix", "header"),
-        ("2 1 2 2 2\n2-by-2, nzmax: 9 nnz: 1000000000, 1-norm: 1\n", "does not fit"),
-        ("2 1 0 2 2 2 2 1 0 0 x 0 0 0.3", "usable"),
-    ],
-)
+@pytest.mark.parametrize("text,words", [
+    ("3 1", "numbers"),
+    ("4 1 0 4 4", "dimension"),
+    ("2 1000000000000 0 2000000000000 2000000000000 2000000000000 2000000000000 1.0", "numbers"),
+    ("2 1 0 3 3", "does not fit"),
+    ("2 1 9 2 2 1 1", "storage"),
+    ("2 1 1 2 2 5000000000 1 1 2 2", "numbers"),
+    ("2 1 2 2 2 no matrix", "header"),
+    ("2 1 2 2 2\n2-by-2, nzmax: 9 nnz: 1000000000, 1-norm: 1\n", "does not fit"),
+    ("2 1 0 2 2 2 2 1 0 0 x 0 0 0.3", "usable"),
+])  # fmt: skip
 def test_malformed_text_is_refused(text, words, tmp_path):
     path = tmp_path / "bad.dat"
     path.write_text(text)

@@ -82,16 +82,9 @@ def test_the_grammar_of_a_diagnosis_agrees_with_its_numbers():
 
 # values that are no number, never one, or one of many, beside what `count` says elsewhere
 MANY = {
-    "MOST_CONTACTS",
-    "MOST_LEVELS",
-    "MOST_ITERATIONS",
-    "FEW",
-    "most",
-    "cells",
-    "loose",
-    "law",
+    "MOST_CONTACTS", "MOST_LEVELS", "MOST_ITERATIONS", "FEW", "most", "cells", "loose", "law",
     "scene.copies",
-}
+}  # fmt: skip
 MANY |= {"scene.dim", "', '.join(map(str, SIZES[dim]))", "len(contacts)", "len(states)", "number"}
 MANY |= {"len(names)", "len(self.couplings)", "axes", "width"}  # said where there are several
 ALWAYS = {"unknown", "node", "name"}  # names is a verb, too

@@ -125,55 +125,47 @@ def test_loads_and_supports_of_the_wrong_type(make):
         )
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"normal": "up"},
-        {"normal": (0.0, 0.0)},
-        {"normal": (np.nan, 1.0)},
-        {"normal": (0.0, 1.0, 0.0)},
-        {"gap": "wide"},
-        {"gap": lambda x: np.full(x.shape[1] + 1, 0.1)},
-        {"gap": lambda x: np.full(x.shape[1], np.nan)},
-        {"gap": lambda x: None},
-        {"force": 3},
-        {"force": {"y": "heavy"}},
-        {"force": {"q": 1.0}},
-        {"displacement": {"y": np.inf}},
-        {"displacement": 1.0},
-        {"force": {"y": 1.0}, "displacement": {"y": 1.0}},
-    ],
-    ids=named,
-)
+@pytest.mark.parametrize("fields", [
+    {"normal": "up"},
+    {"normal": (0.0, 0.0)},
+    {"normal": (np.nan, 1.0)},
+    {"normal": (0.0, 1.0, 0.0)},
+    {"gap": "wide"},
+    {"gap": lambda x: np.full(x.shape[1] + 1, 0.1)},
+    {"gap": lambda x: np.full(x.shape[1], np.nan)},
+    {"gap": lambda x: None},
+    {"force": 3},
+    {"force": {"y": "heavy"}},
+    {"force": {"q": 1.0}},
+    {"displacement": {"y": np.inf}},
+    {"displacement": 1.0},
+    {"force": {"y": 1.0}, "displacement": {"y": 1.0}},
+], ids=named)  # fmt: skip
 def test_rigid_bodies_of_wrong_fields(fields):
     scene = flat_punch(2)
     with pytest.raises(InputError):
         reduce(Scene("s", scene.upper, Rigid("floor", **fields), 0.3, elements=4))
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"upper": 3},
-        {"lower": "punch"},
-        {"mu": None},
-        {"mu": -0.1},
-        {"mu": np.nan},
-        {"mu": "rough"},
-        {"mu": [[0.1], [0.1, 0.2]]},
-        {"mu": np.ones(77)},
-        {"mu": lambda x: "rough"},
-        {"mu": lambda x: -np.ones(x.shape[1])},
-        {"law": "glue"},
-        {"law": 3},
-        {"coupling": "rope"},
-        {"coupling": None},
-        {"carrier": "left"},
-        {"lower": "nobody"},
-        {"lower": "foundation:nowhere"},
-    ],
-    ids=named,
-)
+@pytest.mark.parametrize("fields", [
+    {"upper": 3},
+    {"lower": "punch"},
+    {"mu": None},
+    {"mu": -0.1},
+    {"mu": np.nan},
+    {"mu": "rough"},
+    {"mu": [[0.1], [0.1, 0.2]]},
+    {"mu": np.ones(77)},
+    {"mu": lambda x: "rough"},
+    {"mu": lambda x: -np.ones(x.shape[1])},
+    {"law": "glue"},
+    {"law": 3},
+    {"coupling": "rope"},
+    {"coupling": None},
+    {"carrier": "left"},
+    {"lower": "nobody"},
+    {"lower": "foundation:nowhere"},
+], ids=named)  # fmt: skip
 def test_contacts_of_wrong_fields(fields):
     scene = flat_punch(2)
     with pytest.raises(InputError):
