@@ -143,19 +143,8 @@ def test_sheared_sphere_is_cattaneos():
 
 def test_paths_are_states_of_one_scene():
     cycle = make_path("cattaneo-2d", steps=2, shear=20.0, elements=4)
-    assert [s.upper.loads[0].force["x"] for s in cycle] == [
-        0,
-        10,
-        20,
-        10,
-        0,
-        -10,
-        -20,
-        -10,
-        0,
-        10,
-        20,
-    ]
+    shears = [s.upper.loads[0].force["x"] for s in cycle]
+    assert shears == [0, 10, 20, 10, 0, -10, -20, -10, 0, 10, 20]
     assert all(s.upper.loads[0].force["y"] == -100.0 for s in cycle)
     growing = make_path("hertz-dissimilar", steps=4, force=64.0, elements=4)
     assert [-s.upper.force["z"] for s in growing] == [1.0, 8.0, 27.0, 64.0]

@@ -39,19 +39,8 @@ def built(titles, tmp_path_factory) -> Path:
     `generated`.
     """
     out = tmp_path_factory.mktemp("site")
-    command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-E",
-        "-d",
-        out / "doctrees",
-        SITE,
-        out / "html",
-    ]
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-E"]
+    command += ["-d", out / "doctrees", SITE, out / "html"]
     start = time.perf_counter()
     done = subprocess.run(
         [str(c) for c in command], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT
