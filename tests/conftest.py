@@ -70,9 +70,7 @@ def one_contact(force: tuple[float, float], mu: float) -> InterfaceProblem:
 
 
 def block(kind: str, low: float, high: float, cells: int = 4, width: float = 1.0):
-    """Unit-wide block between two heights: square, cylinder's section or cube; boundaries side0..,
-    top, bottom.
-    """
+    """Unit-wide block between two heights: square, cylinder's section or cube."""
     across = np.linspace(0.0, width, cells + 1) ** 1.3  # uneven on purpose
     grids = [across] * (2 if kind == "solid" else 1)
     up = "z" if kind == "solid" else "y"

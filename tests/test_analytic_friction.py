@@ -167,12 +167,7 @@ def test_singularity_of_the_edge(mu, beta):
 
 
 def contact_algorithm(mu, beta, elements=400):
-    """c/a of the plane punch by constant elements and active sets, from nothing but the law of
-    friction.
-
-    Displacements at the middle of each element from Flamant's logarithm; the edge is graded. No use
-    of Spence's theory.
-    """
+    """c/a of the plane punch by constant elements and active sets."""
     edges = np.sin(np.pi / 2 * np.linspace(0, 1, elements + 1))
     x, width = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
 

@@ -98,9 +98,7 @@ def narrower():
 
 
 def cubes(degree=1, law="coulomb", mu=0.3, below=4, wide=1.0, turn=None, scale=1.0):
-    """A cube of three elements a side pushed askew on another one, both turned in space; lengths in
-    units of `scale`. If less wide, its edges lie within facets of the other.
-    """
+    """A cube of three elements a side pushed askew on another one, both turned in space."""
     turn = np.eye(3) if turn is None else turn
 
     def part(name, n, up, material, moved, wide=1.0):

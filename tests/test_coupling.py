@@ -82,9 +82,7 @@ def test_a_path_makes_its_maps_once(monkeypatch):
 
 
 def sector(scene, degrees):
-    """A pin in a bush cut to a sector of the bush about the lowest point, where the mean normal
-    still has a meaning.
-    """
+    """A pin in a bush cut to a sector of the bush about the lowest point."""
     reach = np.cos(np.deg2rad(degrees / 2))
 
     def cut(part, radius):

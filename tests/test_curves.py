@@ -244,9 +244,7 @@ def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
 
 
 def round_body(shape, second, n=5):
-    """A quarter of a body of revolution about z between two planes through the axis, and the
-    function that is zero on its outer surface, here the radius less that of the section.
-    """
+    """A quarter of a body of revolution about z between two planes through the axis."""
     radius = {
         "cone": lambda z: 2 - 0.4 * z,
         "torus": lambda z: 1 + np.sqrt(1 - (z - 0.5) ** 2),

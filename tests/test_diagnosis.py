@@ -35,9 +35,7 @@ def changed(problem: InterfaceProblem, mu, q: np.ndarray | None = None) -> Inter
 def slipping(
     problem: InterfaceProblem, mu: float, way: float = 1.0
 ) -> tuple[InterfaceProblem, Solution]:
-    """The 2D problem with the load under which all contacts slip the same way, and that solution;
-    normal forces one.
-    """
+    """The 2D problem with the load under which all contacts slip the same way."""
     k = problem.contacts
     r = np.stack([np.ones(k), np.full(k, -mu * way)], axis=1)
     u = np.stack([np.zeros(k), np.full(k, way)], axis=1)

@@ -19,9 +19,7 @@ def gmsh():
 
 
 def disc_in_plate(gmsh, path, dim, order, recombine=False, incomplete=False, version=4.1):
-    """A disc (cylinder) of radius 1 in a square plate of side 4, conforming, with a group 'rim'
-    between them.
-    """
+    """A disc (cylinder) of radius 1 in a square plate of side 4, conforming."""
     for option, value in {
         "Mesh.SecondOrderIncomplete": incomplete, "Mesh.RecombineAll": recombine,
         "Mesh.MeshSizeMax": 0.3 if dim == 2 else 0.7, "Mesh.MshFileVersion": version,

@@ -90,9 +90,7 @@ CUTS = [(False, False), (True, True), (False, True)]  # quadrilaterals, triangle
 
 
 def check_exact(m, upper: Faces, lower: Faces) -> None:
-    """Row sums, linear fields, forces of uniform pressure; all on flat surfaces that cover each
-    other.
-    """
+    """Row sums, linear fields, forces of uniform pressure."""
     for W, surface in zip(m.weights, (upper, lower)):
         assert np.abs(W.sum(axis=1) - 1).max() < 1e-12
         assert np.abs(W @ surface.points.T - m.points.T).max() < 1e-11

@@ -27,9 +27,7 @@ ON_GRIDS = [name for name in PRECONDITIONERS if name != "laplacian"]
 
 @cache
 def blocks(k: int, upper: float, lower: float, nu: float) -> InterfaceProblem:
-    """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below; k nodes on the
-    contact line.
-    """
+    """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below."""
     zone = np.linspace(-2, 2, k)
     h = zone[1] - zone[0]
     punch = rename(tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+")

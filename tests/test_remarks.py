@@ -35,9 +35,7 @@ def calls():
 
 
 def speaking():
-    """(module, name of its logger) of every module that warns in a run, and every module that makes
-    a note.
-    """
+    """(module, name of its logger) of every module that warns in a run."""
     warned, noted = set(), set()
     for room, module, call in calls():
         by = call.func

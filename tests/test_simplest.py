@@ -198,9 +198,7 @@ def test_round_bodies_that_are_nearly_symmetric_stay_whole():
 
 
 def bumpy(height: float, wide: float = 0.01, mu: Callable | float = 0.2) -> Scene:
-    """A rigid disc on the wide top of a block, with an asperity of that height to the right of its
-    middle.
-    """
+    """A rigid disc on the wide top of a block."""
     mesh = rename(
         tensor_mesh(np.linspace(-3, 3, 121), np.linspace(-3, 0, 4)), contact="y+", bottom="y-"
     )

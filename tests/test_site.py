@@ -35,9 +35,7 @@ def titles() -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def built(titles, tmp_path_factory) -> Path:
-    """Site of a build in a process of its own; the folder of the sources is left as it was, but for
-    `generated`.
-    """
+    """Site of a build in a process of its own."""
     out = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-E"]
     command += ["-d", out / "doctrees", SITE, out / "html"]

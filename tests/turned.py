@@ -33,10 +33,7 @@ def mirror(dim: int, axis: int = 0) -> np.ndarray:
 
 
 def moved(scene: Scene, R: np.ndarray) -> Scene:
-    """The whole scene with every point x at R x: meshes, loads, curves, gaps.
-
-    Supports must hold all components.
-    """
+    """The whole scene with every point x at R x: meshes, loads, curves, gaps."""
 
     def mesh(part: Part) -> Callable:
         def build(elements, zone):
@@ -129,9 +126,7 @@ def cylinder(elements: int = 8) -> Scene:
 
 
 def ring(inner: float, outer: float, layers: int, sectors: int) -> skfem.MeshQuad:
-    """A whole annulus of quadrilaterals, unevenly divided along the circle; boundaries 'inside' and
-    'outside'.
-    """
+    """A whole annulus of quadrilaterals, unevenly divided along the circle."""
     angle = 2 * np.pi * np.arange(sectors) / sectors
     angle = angle + 0.15 * np.sin(angle) + 0.05 * np.cos(3 * angle)
     radius = np.linspace(inner, outer, layers + 1)
@@ -155,11 +150,7 @@ def ring(inner: float, outer: float, layers: int, sectors: int) -> skfem.MeshQua
 def pin_in_bush(
     clearance: float = 0.5, sectors: int = 40, mu: float = 0.2, radius: float = 20.0
 ) -> Scene:
-    """A pin with a hole, loaded in the hole through a glued plate, in a bush that is clamped
-    outside.
-
-    A clearance beyond the node spacing is allowed: pi radius / 20 is the mean spacing.
-    """
+    """A pin with a hole, loaded in the hole through a glued plate."""
     pin = Part(
         "pin",
         ring(radius / 2, radius - clearance, 3, sectors),
