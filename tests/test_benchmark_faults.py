@@ -34,7 +34,7 @@ def one_line(text: str, words: str = "") -> None:
 # Plug-ins of every bad kind
 
 BAD = """
-import os, subprocess, sys, time
+import ctypes, os, subprocess, sys, time
 import numpy as np
 from contactopt import Solution, Status
 from contactopt.benchmark import method
@@ -90,23 +90,47 @@ def chatters(problem):
         os.write(1, b"x" * 10**6)
 
 @method
+def segfaults(problem):
+    ctypes.string_at(0)
+
+@method
+def aborts(problem):
+    print("last words")
+    os.abort()
+
+@method
+def hangs(problem):
+    while True:
+        time.sleep(1)
+
+@method
+def nan(problem):
+    return np.full(problem.q.shape, np.nan)
+
+@method
+def lies(problem, tol=1e-8):
+    return Solution(1.01 * right(problem), np.zeros(len(problem.s)), Status.SOLVED, 0.0, 1, "lies")
+
+@method
+def hoards(problem):
+    return np.ones(10**9)
+
+@method
+def raises(problem):
+    raise KeyError("an argument")
+
+@method
 def honest(problem, number=0):
     return right(problem)
 """
 
 ENDS = {
-    "forks": "solved",
-    "lets_the_child_answer": "crashed",
-    "leaves": "crashed",
-    "interrupts": "error",
-    "complex_numbers": "error",
-    "text": "error",
-    "too_many": "error",
-    "no_status": "error",
-    "shares_memory": "out_of_memory",
-    "chatters": "killed",
-    "honest": "solved",
-}
+    "forks": "solved", "lets_the_child_answer": "crashed", "leaves": "crashed",
+    "interrupts": "error", "complex_numbers": "error", "text": "error", "too_many": "error",
+    "no_status": "error", "shares_memory": "out_of_memory", "chatters": "killed",
+    "segfaults": "crashed", "aborts": "crashed", "hangs": "killed", "nan": "not_finite",
+    "lies": "false_claim", "hoards": "out_of_memory", "raises": "error", "honest": "solved",
+}  # fmt: skip
 
 
 @pytest.mark.slow
@@ -143,8 +167,15 @@ def test_plugins_of_every_bad_kind_get_the_rows_that_they_deserve(tmp_path, monk
     )
     ends = {name: set(rows["status"]) for name, rows in table.groupby("name")}
     assert ends == {name: {status} for name, status in ENDS.items()}
-    assert table["fingerprint"].nunique() == 1
+    # of those that never returned, too
+    assert table["fingerprint"].nunique() == 1 and set(table["contacts"]) == {5}
     assert (table["success"] == (table["residual"] <= 1e-6)).all()
+    row = {name: rows.iloc[0] for name, rows in table.groupby("name")}
+    assert row["segfaults"]["message"].startswith("SIGSEGV")
+    assert "SIGABRT" in row["aborts"]["message"] and "last words" in row["aborts"]["message"]
+    assert "KeyError" in row["raises"]["message"] and np.isinf(row["nan"]["residual"])
+    assert row["lies"]["claimed"] and not row["lies"]["success"] and row["lies"]["residual"] > 1e-4
+    assert set(table["status"]) <= set(store.STATUSES)
     assert max(largest) < 1e9, "what a solver prints is thrown away beyond a bound"
 
 

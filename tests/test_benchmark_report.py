@@ -27,15 +27,11 @@ REPORTS = Path(__file__).parents[1] / "reports"
 def table(**columns) -> pd.DataFrame:
     """Rows with the given columns; the others as in a successful run."""
     size = max(len(v) for v in columns.values())
-    usual = {"setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True}
-    usual |= {
-        "claimed": True,
-        "status": "solved",
-        "residual": 1e-7,
-        "time_limit": 10.0,
-        "problem": "p",
-        "method": "m",
-    }
+    usual = {
+        "setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True,
+        "claimed": True, "status": "solved", "residual": 1e-7, "time_limit": 10.0,
+        "problem": "p", "method": "m",
+    }  # fmt: skip
     return pd.DataFrame({name: [value] * size for name, value in usual.items()} | columns)
 
 
