@@ -301,6 +301,10 @@ UNCUT = """(() => {
   };
   return words.every(inside) ? words.length : -1;
 })()"""
+CHANGE = (
+    "(() => {{ const c = document.getElementById('{}'); c.value = '{}';"
+    " c.dispatchEvent(new Event('{}')); }})()"
+)
 SAME = "painter.pixels.reduce((sum, pixel) => (31 * sum + pixel) | 0, 0)"
 
 
@@ -348,18 +352,14 @@ def exposed(folder):
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_the_slider_moves_the_bodies_and_any_column_of_the_history_is_drawn(folder):
-    change = (
-        "(() => {{ const c = document.getElementById('{}'); c.value = '{}';"
-        " c.dispatchEvent(new Event('{}')); }})()"
-    )
     with Browser(exposed(folder / "path"), 1000) as browser:
         browser.wait("performance.getEntriesByName('charted').length > 0")
         last = browser.ask(SAME)
-        browser.ask(change.format("state", 0, "input"))
+        browser.ask(CHANGE.format("state", 0, "input"))
         browser.wait(f"{SAME} !== {last}")
         words = browser.ask("document.getElementById('state-words').innerText")
         assert words.startswith("state 1 of ")
-        browser.ask(change.format("upward", "elastic_energy", "change"))
+        browser.ask(CHANGE.format("upward", "elastic_energy", "change"))
         # heights of the dots in the chart are linear in the column of the history
         dots = "[...document.querySelectorAll('#path-chart circle')]"
         drawn = np.array(browser.ask(f"{dots}.map((dot) => +dot.getAttribute('cy'))"))[
@@ -374,10 +374,6 @@ def test_the_slider_moves_the_bodies_and_any_column_of_the_history_is_drawn(fold
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_solids_are_cut_and_mirrored(folder):
-    change = (
-        "(() => {{ const c = document.getElementById('{}'); c.value = '{}';"
-        " c.dispatchEvent(new Event('{}')); }})()"
-    )
     with Browser(exposed(folder / "solid"), 1000) as browser:
         browser.wait("performance.getEntriesByName('drawn').length > 0")
         browser.press("b")
@@ -386,8 +382,8 @@ def test_solids_are_cut_and_mirrored(folder):
         assert browser.ask(SEEN)["share"] < 0.7 * whole  # a quarter of the bodies
         browser.ask("document.getElementById('whole').click()")
         assert browser.ask(SEEN)["share"] == pytest.approx(whole)
-        browser.ask(change.format("cut", 0, "change"))
-        browser.ask(change.format("cut-place", 0.5, "input"))
+        browser.ask(CHANGE.format("cut", 0, "change"))
+        browser.ask(CHANGE.format("cut-place", 0.5, "input"))
         browser.wait(f"{SEEN}.share < {0.95 * whole}")
         assert "from x = " in browser.ask("document.getElementById('cut-words').textContent")
         assert not browser.faults

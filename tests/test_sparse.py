@@ -9,7 +9,7 @@ from contactopt.benchmark.families.packings import packing
 from contactopt.benchmark.problems import FAMILIES
 from contactopt.linear.operators import asymmetry, block, dense, diagonal, held, shifted
 from contactopt.methods.kernels.interior import interior_iterates
-from contactopt.methods.kernels.sparse_blocks import DenseBlocks, SparseBlocks
+from contactopt.methods.kernels.sparse_blocks import SparseBlocks
 from contactopt.problem import dimensionless
 
 
@@ -68,17 +68,6 @@ def test_unsymmetric_compliance_is_solved_as_it_stands():
     for method in ("tresca", "acary_cadoux", "alternating"):
         with pytest.raises(InputError, match="unsymmetric"):
             solve(problem, method)
-
-
-def test_block_systems_dense_and_sparse_agree(stack):
-    rng = np.random.default_rng(0)
-    k, d = stack.q.shape
-    left, added = rng.normal(size=(k, d, d)), rng.normal(size=(k, d, d)) + 20 * np.eye(d)
-    kept = np.repeat(rng.random(k) < 0.7, d)
-    right = rng.normal(size=(kept.sum(), 3))
-    one = SparseBlocks(stack.Q, d).factor(left, added, kept)(right)
-    two = DenseBlocks(stack.Q.toarray(), d).factor(left, added, kept)(right)
-    assert np.allclose(one, two, rtol=1e-8, atol=1e-10)
 
 
 def test_a_plate_on_a_sparse_compliance():
