@@ -80,9 +80,8 @@ def test_pairs_that_share_no_elastic_body_do_not_know_of_each_other():
         assert np.allclose(together.reactions[pair.contacts], own.reactions, atol=1e-10)
         problem, seen = alone(both.problem, together, pair)
         assert natural_map_residual(problem, seen.reactions, seen.multipliers) < 1e-10
-        assert type(problem.law) is type(single.problem.law) and np.array_equal(
-            problem.mu, single.problem.mu
-        )
+        assert type(problem.law) is type(single.problem.law)
+        assert np.array_equal(problem.mu, single.problem.mu)
 
 
 def test_a_pair_alone_is_solved_by_its_part_of_the_solution():
@@ -181,9 +180,8 @@ def test_forces_on_every_body_are_in_balance():
     pairs, holders = pair_resultants(reduction, solution), holder_resultants(reduction, solution)
     on_lower, on_middle = pairs["middle-lower"], pairs["upper-middle.top"]
     plate, support = holders["body 'upper', plate 'top'"], holders["body 'lower', support 'bottom'"]
-    assert np.allclose(plate.force + on_middle.force, 0, atol=1e-9) and plate.force[
-        1
-    ] == pytest.approx(-2.0)
+    assert np.allclose(plate.force + on_middle.force, 0, atol=1e-9)
+    assert plate.force[1] == pytest.approx(-2.0)
     assert np.allclose(plate.moment + on_middle.moment, 0, atol=1e-9)
     assert np.allclose(on_lower.force - on_middle.force + [-0.1, 0.0], 0, atol=1e-9)
     # at half its height

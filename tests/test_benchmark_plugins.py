@@ -115,9 +115,8 @@ def identity(contacts=2):
     """
     table = run(tmp_path, text)
     assert sorted(set(table["contacts"])) == [1, 10, 100] and set(table["status"]) == {"solved"}
-    assert set(table["method"]) == {"Mine(patience=1)", "Mine(patience=2)"} and set(
-        table["method.patience"]
-    ) == {1, 2}
+    assert set(table["method"]) == {"Mine(patience=1)", "Mine(patience=2)"}
+    assert set(table["method.patience"]) == {1, 2}
     assert (table["iterations"] >= 1).all() and table["label"].str.startswith("Mine(").all()
 
 
@@ -188,11 +187,8 @@ def test_a_run_past_its_time_limit_is_no_success(tmp_path, monkeypatch):
         "limit = 10.0", "limit = 0.4"
     )
     table = run(tmp_path, text, filters=["problem=rigid*"])
-    assert (
-        set(table["status"]) == {"time_limit"}
-        and not table["success"].any()
-        and (table["residual"] < 1e-8).all()
-    )
+    assert set(table["status"]) == {"time_limit"} and not table["success"].any()
+    assert (table["residual"] < 1e-8).all()
 
 
 @pytest.mark.slow

@@ -191,11 +191,8 @@ def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     assert again == text and "1. 12 runs were made." in text and "What it is." in text
     for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
         assert Path("reports/small", name).stat().st_size > 1000
-    assert (
-        text.count("*Figure ") == 2
-        and text.count("*Table ") == 1
-        and "contactopt report --run full small" in text
-    )
+    assert text.count("*Figure ") == 2 and text.count("*Table ") == 1
+    assert "contactopt report --run full small" in text
     quick = Path("out/quick/reports/small/report.md").read_text()
     assert "1. 6 runs were made." in quick
     csv = benchmark.load("reports/small/rows.csv")

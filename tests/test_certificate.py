@@ -47,9 +47,8 @@ def test_a_problem_without_a_solution_ends_infeasible_in_all_units(name, force, 
     ray = solution.proof
     e = np.zeros(problem.q.shape)
     e[:, 0] = ray.weights
-    assert np.all(ray.weights >= 0) and np.all(
-        np.abs(problem.Q.T @ e.ravel()) <= 1e-12 * np.abs(problem.Q).max()
-    )
+    assert np.all(ray.weights >= 0)
+    assert np.all(np.abs(problem.Q.T @ e.ravel()) <= 1e-12 * np.abs(problem.Q).max())
     assert np.sum(problem.q * e) < 0
 
 

@@ -217,12 +217,8 @@ def test_long_solves_say_what_they_reached(monkeypatch):
     )
     steps = [line for line in said if line.startswith("step")]
     assert len(steps) == solved.solution.iterations
-    assert (
-        "V-cycles" in steps[0]
-        and "GiB" in steps[0]
-        and "s left" in steps[1]
-        and "s left" not in steps[-1]
-    )
+    assert "V-cycles" in steps[0] and "GiB" in steps[0] and "s left" in steps[1]
+    assert "s left" not in steps[-1]
 
 
 def test_time_left_goes_on_as_the_last_step():

@@ -103,10 +103,8 @@ def test_contraction_and_uniqueness_are_two_conditions():
     Q[1::2, 1::2] = 4 * np.eye(2)
     Q[::2, 1::2], Q[1::2, ::2] = coupling, coupling.T
     report = diagnose(InterfaceProblem(Q, np.zeros((2, 2)), 0.5))
-    assert (
-        report.uniform_slip.alternating == pytest.approx(1.0)
-        and report.uniform_slip.unique == np.inf
-    )
+    assert report.uniform_slip.alternating == pytest.approx(1.0)
+    assert report.uniform_slip.unique == np.inf
     loaded, solution = slipping(InterfaceProblem(Q, np.zeros((2, 2)), 0.5), 1.1)
     assert len(all_solutions(loaded)) == 1
     assert rate(loaded, solution, Alternating(), 60) == pytest.approx(1.1, rel=1e-3)
@@ -171,11 +169,8 @@ def test_rank_condition_and_symmetry():
     Q = A @ np.diag([4.0, 3.0, 2.0, 1.0, 0.5, 0.0]) @ A.T
     report = diagnose(InterfaceProblem(Q, np.zeros((3, 2)), 0.5))
     assert (report.rank, report.size, report.held) == (5, 6, 0)
-    assert (
-        report.condition == pytest.approx(8.0)
-        and abs(report.least) < 1e-15
-        and report.asymmetry < 1e-15
-    )
+    assert report.condition == pytest.approx(8.0) and abs(report.least) < 1e-15
+    assert report.asymmetry < 1e-15
     Q[0, 1] += 0.01
     skew = diagnose(InterfaceProblem(Q, np.zeros((3, 2)), 0.5))
     assert skew.asymmetry == pytest.approx(0.01 * np.sqrt(2) / np.linalg.norm(Q))

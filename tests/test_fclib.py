@@ -85,9 +85,8 @@ def store(group, matrix, storage):
 def test_global_form_is_condensed(storage, tmp_path):
     W, q = global_file(tmp_path / "g.hdf5", storage)
     problem = fclib.read(tmp_path / "g.hdf5")
-    assert np.allclose(dense(problem.Q), W, atol=1e-15) and np.allclose(
-        problem.q.ravel(), q, atol=1e-15
-    )
+    assert np.allclose(dense(problem.Q), W, atol=1e-15)
+    assert np.allclose(problem.q.ravel(), q, atol=1e-15)
     assert solve(problem, tol=1e-12).solved
 
 

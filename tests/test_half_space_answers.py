@@ -306,11 +306,8 @@ def test_rough_scene_slides_in_the_end():
     assert history["shear_force"][-1] == pytest.approx(0.3 * history["normal_force"][-1], rel=1e-3)
     assert np.all(np.diff(history["friction_work"]) > 0) and history["energy_error"].max() < 1e-9
     maps = surface_maps(result.reduction, result.solution)
-    assert maps["pressure"].shape == maps["gap"].shape == (48, 48) and maps["slip"].shape == (
-        48,
-        48,
-        2,
-    )
+    assert maps["pressure"].shape == maps["gap"].shape == (48, 48)
+    assert maps["slip"].shape == (48, 48, 2)
     np.testing.assert_allclose(
         np.minimum(maps["pressure"] / maps["pressure"].max(), maps["gap"]), 0, atol=1e-7
     )

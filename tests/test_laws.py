@@ -166,9 +166,8 @@ def test_frictionless_contact_is_coulomb_without_friction(dim):
         solve(replace(problem, law=Frictionless()), tol=1e-12),
         solve(problem, tol=1e-12),
     )
-    assert answer.solved and np.allclose(
-        answer.reactions, other.reactions, atol=1e-9 * np.abs(other.reactions).max()
-    )
+    assert answer.solved
+    assert np.allclose(answer.reactions, other.reactions, atol=1e-9 * np.abs(other.reactions).max())
     assert not answer.reactions[:, 1:].any()
 
 
@@ -189,9 +188,8 @@ def test_convex_laws_project_on_a_fixed_convex_set(name):
     rng = np.random.default_rng(2)
     x, y, law = rng.normal(size=(200, 3)), rng.normal(size=(200, 3)), ALL[name].spread(200)
     (a, D), b = law.project(x), law.project(y)[0]
-    assert np.all(np.sum((a - b) * (x - y - a + b), axis=1) > -1e-12) and np.allclose(
-        D, D.transpose(0, 2, 1)
-    )
+    assert np.all(np.sum((a - b) * (x - y - a + b), axis=1) > -1e-12)
+    assert np.allclose(D, D.transpose(0, 2, 1))
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -203,9 +201,8 @@ def test_units_change_nothing(name):
         problem.Q * length / force, problem.q * length, problem.law.scaled(1 / force)
     )
     a, b = solve(problem, tol=1e-11), solve(other, tol=1e-11)
-    assert a.iterations == b.iterations and np.allclose(
-        a.reactions * force, b.reactions, rtol=1e-9, atol=1e-9 * force
-    )
+    assert a.iterations == b.iterations
+    assert np.allclose(a.reactions * force, b.reactions, rtol=1e-9, atol=1e-9 * force)
     assert np.allclose(dimensionless(problem)[0].q, dimensionless(other)[0].q)
 
 
@@ -244,17 +241,11 @@ def test_selection_and_joining_keep_every_contact_with_its_law():
     order = np.array([4, 0, 2, 2, 1])
     assert np.allclose(law.select(order).project(y[order])[0], law.project(y)[0][order])
     some = np.array([False, True, True, True, False])
-    assert isinstance(law.select(some), Coulomb) and list(law.select(some).coefficient) == [
-        0.9,
-        0.5,
-        0.1,
-    ]
+    assert isinstance(law.select(some), Coulomb)
+    assert list(law.select(some).coefficient) == [0.9, 0.5, 0.1]
     nested = join([(law, np.arange(5)), (Bilateral([0.7]), [5])])
-    assert (
-        list(nested.lowest) == [0, 0, 0, 0, 0, -np.inf]
-        and not nested.unilateral
-        and nested.coefficient[5] == 0.7
-    )
+    assert list(nested.lowest) == [0, 0, 0, 0, 0, -np.inf] and not nested.unilateral
+    assert nested.coefficient[5] == 0.7
     for overlapping in ([0], [2]):
         with pytest.raises(InputError, match="every contact needs exactly one law"):
             join([(Coulomb([0.1]), [0]), (Tresca([0.1]), overlapping)])

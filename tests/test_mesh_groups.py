@@ -21,11 +21,8 @@ def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
     )
     whole, left = load_mesh(path), load_mesh(path, "left")
     assert whole.nelements == 2 and left.nelements == 1
-    assert (
-        set(whole.boundaries) == {"floor"}
-        and len(whole.boundaries["floor"]) == 2
-        and len(left.boundaries["floor"]) == 1
-    )
+    assert set(whole.boundaries) == {"floor"} and len(whole.boundaries["floor"]) == 2
+    assert len(left.boundaries["floor"]) == 1
     tags = {"gmsh:physical": [np.array([3, 4])]}
     path = write(
         tmp_path / "a.vtu", SQUARE, [("quad", TWO)], cell_data={"part": [np.array([3, 4])]}

@@ -310,11 +310,8 @@ def test_units_do_not_matter():
     weight = np.random.default_rng(1).normal(size=problem.q.shape)
     one = contactopt.sensitivity(problem, solution).adjoint(reactions=weight)
     two = contactopt.sensitivity(other, scaled).adjoint(reactions=weight)
-    assert (
-        np.allclose(two.q * length / force, one.q)
-        and np.allclose(two.mu / force, one.mu)
-        and np.allclose(two.s, one.s)
-    )
+    assert np.allclose(two.q * length / force, one.q) and np.allclose(two.mu / force, one.mu)
+    assert np.allclose(two.s, one.s)
 
 
 def test_bad_input_is_refused_in_one_sentence():

@@ -15,9 +15,8 @@ from contactopt.solving.solve_scene import solve_scene
 def test_a_solid_that_is_a_plate_between_rollers_is_in_plane_strain():
     solid, plane = prism(), punch(force={"x": 1.0, "y": -10.0})
     found = simplify(solid, solve=False)
-    assert [each.name for each in found.found] == [
-        "plane strain"
-    ] and found.scene.kind == "plane-strain"
+    assert [each.name for each in found.found] == ["plane strain"]
+    assert found.scene.kind == "plane-strain"
     whole, section = (solve_scene(scene, options=TIGHT) for scene in (solid, found.scene))
     exact = solve_scene(replace(plane, thickness=1.5), options=TIGHT)
     assert np.allclose(numbers(section), numbers(exact), rtol=1e-8)
@@ -102,11 +101,8 @@ def test_friction_that_does_nothing_is_left_out():
 
 def test_a_report_reads_well_and_names_are_known():
     found = simplify(punch())
-    assert (
-        "mirror symmetry" in repr(found)
-        and "<table>" in found._repr_html_()
-        and str(found).count("\n") > 3
-    )
+    assert "mirror symmetry" in repr(found) and "<table>" in found._repr_html_()
+    assert str(found).count("\n") > 3
     with pytest.raises(
         InputError, match="no simplification 'plane strain'; found were: mirror symmetry"
     ):

@@ -73,9 +73,7 @@ def test_the_convex_problem_is_solved_to_rounding(cube, bilateral):
 
 
 def test_settings_are_checked():
-    assert Tresca().backends(2) == ("proxqp", "proxqp") and Tresca().backends(3) == (
-        "clarabel",
-        "clarabel",
-    )
+    assert Tresca().backends(2) == ("proxqp", "proxqp")
+    assert Tresca().backends(3) == ("clarabel", "clarabel")
     with pytest.raises(InputError, match="unknown conic backend 'proxqp'"):
         Tresca("proxqp").backends(3)
