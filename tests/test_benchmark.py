@@ -268,10 +268,8 @@ def test_families_are_what_they_say():
     r = solve(held, tol=1e-12).reactions
     np.testing.assert_allclose(r[:, 0], -held.q[:, 0] / np.diag(held.Q)[::2], rtol=1e-9)
     assert (np.abs(r[:, 1]) <= 0.5 * r[:, 0] * (1 + 1e-9)).all() and np.abs(r[:, 1]).max() > 0
-    plain, twice = (
-        problems.reduced("punch-2d", elements=4),
-        problems.redundant("punch-2d", elements=4, copies=2),
-    )
+    plain = problems.reduced("punch-2d", elements=4)
+    twice = problems.redundant("punch-2d", elements=4, copies=2)
     shared = solve(twice, tol=1e-10).reactions.reshape(plain.contacts, 2, 2).sum(axis=1)
     np.testing.assert_allclose(shared, solve(plain, tol=1e-10).reactions, atol=1e-5)
     units = problems.in_units("punch-2d", force=1e-3, length=1e-3, elements=4)

@@ -223,10 +223,8 @@ def test_scenes_are_halved_with_the_curves_that_they_give():
 @pytest.mark.parametrize("dim", [2, 3])
 def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
     """Near the long facets of the floor lie small ones of the walls, with nearer centres."""
-    heights, kind = (
-        np.array([0.0, *np.geomspace(1e-6, 1, 25)]),
-        skfem.MeshTri if dim == 2 else skfem.MeshTet,
-    )
+    heights = np.array([0.0, *np.geomspace(1e-6, 1, 25)])
+    kind = skfem.MeshTri if dim == 2 else skfem.MeshTet
     mesh = kind.init_tensor(*[np.array([0.0, 1.0])] * (dim - 1), heights)
     sides = {"floor": (dim - 1, 0.0), "wall": (0, 0.0)}
     mesh = mesh.with_boundaries(

@@ -31,10 +31,8 @@ def disc_in_plate(gmsh, path, dim, order, recombine=False, incomplete=False, ver
             [(2, gmsh.model.occ.addDisk(0, 0, 0, 1, 1))],
         )
     else:
-        box, cylinder = (
-            gmsh.model.occ.addBox(-2, -2, 0, 4, 4, 1),
-            gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1),
-        )
+        box = gmsh.model.occ.addBox(-2, -2, 0, 4, 4, 1)
+        cylinder = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1)
         tools = [(3, box)], [(3, cylinder)]
     gmsh.model.occ.fragment(*tools)
     gmsh.model.occ.synchronize()

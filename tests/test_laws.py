@@ -162,10 +162,8 @@ def test_associated_friction_is_the_program_in_cvxpy(dim):
 @pytest.mark.parametrize("dim", [2, 3])
 def test_frictionless_contact_is_coulomb_without_friction(dim):
     problem = reduce(scenes.flat_punch(dim, elements=6 if dim == 2 else 3, mu=0.0))
-    answer, other = (
-        solve(replace(problem, law=Frictionless()), tol=1e-12),
-        solve(problem, tol=1e-12),
-    )
+    answer = solve(replace(problem, law=Frictionless()), tol=1e-12)
+    other = solve(problem, tol=1e-12)
     assert answer.solved
     assert np.allclose(answer.reactions, other.reactions, atol=1e-9 * np.abs(other.reactions).max())
     assert not answer.reactions[:, 1:].any()
@@ -322,10 +320,8 @@ def test_a_law_is_one_file_and_one_line(monkeypatch):
         solution = solve(problem, method, tol=1e-10)
         assert solution.solved
         u = problem.displacements(solution.reactions, solution.multipliers)
-        slip, force = (
-            np.linalg.norm(u[:, 1:], axis=1),
-            np.linalg.norm(solution.reactions[:, 1:], axis=1),
-        )
+        slip = np.linalg.norm(u[:, 1:], axis=1)
+        force = np.linalg.norm(solution.reactions[:, 1:], axis=1)
         bound = np.minimum(0.8 * solution.reactions[:, 0], 0.5)
         assert np.all(force <= bound + 1e-8) and np.allclose(slip * (bound - force), 0, atol=1e-8)
         assert {0.5} < set(np.round(bound, 9))  # some bounds are at the limit, some below

@@ -64,10 +64,8 @@ def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
     if np.linalg.det(R) < 0 and p.chart.period is None:
         chart, other = np.abs(chart), np.abs(other)
     elif np.linalg.det(R) < 0:
-        chart, other = (
-            np.minimum(chart, p.chart.period - chart),
-            np.minimum(other, p.chart.period - other),
-        )
+        chart = np.minimum(chart, p.chart.period - chart)
+        other = np.minimum(other, p.chart.period - other)
     assert np.abs(chart - other).max() < 1e-9 * np.abs(chart).max()
     if np.linalg.det(R) > 0:
         # contacts are numbered along the surface, whatever way it lies

@@ -214,11 +214,8 @@ def damaged(data: bytes, way: str, rng: np.random.Generator) -> bytes:
 def test_damaged_results_become_a_page_or_one_sentence(folder, tmp_path, monkeypatch, capfd):
     """Files cut, flipped, swapped, missing, and values of other types, in all three runs."""
     monkeypatch.setattr("contactopt.figures.view_page.write_html", lambda *given: None)
-    rng, refused, ways = (
-        np.random.default_rng(2),
-        0,
-        ("cut", "flipped", "empty", "swapped", "missing", "type"),
-    )
+    rng, refused = np.random.default_rng(2), 0
+    ways = ("cut", "flipped", "empty", "swapped", "missing", "type")
     for number in range(54):
         run_folder = folder / ("flat", "solid", "path")[number % 3]
         work = tmp_path / str(number)

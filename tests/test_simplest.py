@@ -253,10 +253,8 @@ def test_stress_at_the_plane_is_that_of_the_whole():
         for number in range(2):
             fields, stresses = [], []
             for each in (one, other):
-                body, U = (
-                    each.reduction.bodies[number],
-                    each.reduction.displaced(each.solution)[number],
-                )
+                body = each.reduction.bodies[number]
+                U = each.reduction.displaced(each.solution)[number]
                 made, recovered = views.fields(body, U), views.stress_map(body, Region())
                 plane, there = (np.abs(x[0] - 3.0) < 1e-9 for x in (made.mesh.p, recovered.places))
                 fields.append(made.stress[plane][np.argsort(made.mesh.p[1, plane])])
