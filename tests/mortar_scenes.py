@@ -16,7 +16,7 @@ from contactopt.coupling.faces import faces_of
 from contactopt.coupling.mortar import Mortar, mortar
 from contactopt.coupling.mortar_surfaces import couple_surfaces
 from contactopt.coupling.reduction import Reduction
-from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.meshes.structured import tensor_mesh
 
 
 @dataclass
@@ -87,27 +87,6 @@ def resultants(forces: list[np.ndarray], points: list[np.ndarray]) -> tuple[np.n
 
     moment = sum(np.cross(tall(x), tall(f), axis=0).sum(axis=1) for x, f in zip(points, forces))
     return sum(f.sum(axis=1) for f in forces), moment
-
-
-def slab(
-    kind: str,
-    low: float,
-    high: float,
-    cells: int,
-    start: float = 0.0,
-    end: float = 1.0,
-    power: float = 1.3,
-) -> Any:
-    """Two layers of elements between two heights and two places, `cells` of uneven width."""
-    grids = [start + (end - start) * np.linspace(0.0, 1.0, cells + 1) ** power] * (
-        2 if kind == "solid" else 1
-    )
-    up = "z" if kind == "solid" else "y"
-    names = {f"side{i}": f"{'xy'[i]}-" for i in range(len(grids))} | {
-        "top": f"{up}+",
-        "bottom": f"{up}-",
-    }
-    return rename(tensor_mesh(*grids, np.linspace(low, high, 3)), **names)
 
 
 def ring(

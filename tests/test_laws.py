@@ -35,6 +35,7 @@ from contactopt.problem.laws import (
     find_law,
     join,
 )
+from tests.test_orthotropic import random_problem
 
 ALL = {
     "coulomb": Coulomb(0.4),
@@ -45,14 +46,6 @@ ALL = {
     "tied": Tied(),
     "orthotropic": Orthotropic(0.3, 0.6, 0.5),
 }
-
-
-def random_problem(law: Law | float, k: int = 6, dim: int = 3, seed: int = 0) -> InterfaceProblem:
-    rng = np.random.default_rng(seed)
-    A = rng.normal(size=(k * dim, k * dim))
-    q = rng.normal(size=(k, dim))
-    q[:, 0] -= 0.5
-    return InterfaceProblem(A @ A.T / (k * dim) + 0.5 * np.eye(k * dim), q, law)
 
 
 # the largest tangential force under a normal force, by laws with one bound in all directions

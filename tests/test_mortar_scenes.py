@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import skfem
-from conftest import MATERIAL, two_blocks
-from mortar_scenes import couple, press_fit, resultants, ring, slab
+from conftest import MATERIAL, block, two_blocks
+from mortar_scenes import couple, press_fit, resultants, ring
 
 from contactopt import (
     Contact,
@@ -100,8 +100,8 @@ def test_patch_test_uniform_pressure_is_exact(kind, degree, cut, cells, own):
     if kind == "solid" and degree == 2:
         b = {3: 3, 6: 4, 7: 5}[b]
     scene = two_blocks(kind, force=3.0)
-    upper = replace(scene.upper, mesh=slab(kind, 0, 1, a))
-    lower = replace(scene.lower, mesh=slab(kind, -2, 0, b, power=1.0))
+    upper = replace(scene.upper, mesh=block(kind, 0, 1, a, layers=3))
+    lower = replace(scene.lower, mesh=block(kind, -2, 0, b, layers=3, power=1.0))
     coupled = couple(with_elements(replace(scene, upper=upper, lower=lower), degree, cut), own)
     solution = solve(coupled.problem, tol=1e-12)
     pressure = solution.reactions[:, 0] / coupled.problem.areas
@@ -303,7 +303,9 @@ def test_a_small_block_on_a_large_one():
 
 def test_mortar_is_chosen_where_nodes_do_not_match(caplog):
     scene = two_blocks("plane-strain", force=3.0)
-    finer = replace(scene, lower=replace(scene.lower, mesh=slab("plane-strain", -2, 0, 7)))
+    finer = replace(
+        scene, lower=replace(scene.lower, mesh=block("plane-strain", -2, 0, 7, layers=3))
+    )
     with caplog.at_level(logging.INFO, logger="contactopt.coupling"):
         same, other = reduce_bodies(scene), reduce_bodies(finer)
     assert (same.coupling.kind, other.coupling.kind, other.coupling.carrier) == (

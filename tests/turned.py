@@ -42,9 +42,17 @@ def moved(scene: Scene, R: np.ndarray) -> Scene:
 
         return build
 
-    def vector(values: dict[str, float]) -> dict[str, float]:
-        assert set(values) == set(scene.components), "give a value for every component"
-        return dict(zip(scene.components, R @ [values[name] for name in scene.components]))
+    def vector(values: dict[str, float] | None) -> dict[str, float] | None:
+        if values is None:
+            return None
+        names, moved = scene.components, R @ [values.get(name, 0.0) for name in scene.components]
+        if set(values) == set(names):
+            return dict(zip(names, moved))
+        there = np.abs(R) @ [name in values for name in names]
+        assert np.allclose(there, np.round(there), atol=1e-9), (
+            "give all components, or turn axes onto axes"
+        )
+        return {name: value for name, value, own in zip(names, moved, there) if own > 0.5}
 
     def load(old):
         if isinstance(old, Plate):
@@ -60,13 +68,12 @@ def moved(scene: Scene, R: np.ndarray) -> Scene:
                 part,
                 normal=None if part.normal is None else tuple(R @ np.array(part.normal)),
                 gap=None if part.gap is None else lambda x: part.gap(R.T @ x),
-                force=None if part.force is None else vector(part.force),
+                force=vector(part.force),
             )
-        assert all(support.displacement is None for support in part.supports), (
-            "clamp all components"
-        )
+        supports = tuple(replace(s, displacement=vector(s.displacement)) for s in part.supports)
         loads = tuple(load(old) for old in part.loads)
-        return replace(part, mesh=mesh(part), loads=loads, curve=curve(part))
+        mine = {"mesh": mesh(part), "curve": curve(part), "supports": supports, "loads": loads}
+        return replace(part, **mine)
 
     return replace(scene, upper=part_of(scene.upper), lower=part_of(scene.lower))
 
