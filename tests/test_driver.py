@@ -89,8 +89,9 @@ def test_a_load_that_nothing_balances_does_not_outlast_the_time_limit(method):
     problem = InterfaceProblem(
         np.eye(6), rng.normal(size=(2, 3)), 1e-3, rng.normal(size=(6, 3)), [1.0, -1.0, 1.0]
     )
-    solution = solve(problem, method, time_limit=0.5, max_iterations=10**9)
-    assert not solution.solved and solution.seconds["solve"] < 5.0
+    begin = time.process_time()  # the clock depends on what else runs on the machine
+    assert not solve(problem, method, time_limit=0.5, max_iterations=10**9).solved
+    assert time.process_time() - begin < 5.0
 
 
 def test_a_method_that_repeats_itself_is_stopped():

@@ -6,6 +6,7 @@ import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator
+from turned import renumbered
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce, scenes
 from contactopt.meshes.structured import graded, rename, tensor_mesh
@@ -111,13 +112,7 @@ def test_they_are_symmetric_positive_definite_and_blind_to_order_and_units(name)
     assert np.allclose(P, P.T, atol=1e-9 * np.abs(P).max()) and la.eigvalsh((P + P.T) / 2)[0] > 0
     order = np.random.default_rng(0).permutation(17)
     rows = (2 * order[:, None] + np.arange(2)).ravel()
-    mixed = InterfaceProblem(
-        problem.Q[np.ix_(rows, rows)],
-        problem.q[order],
-        0.5,
-        areas=1e6 * problem.areas[order],
-        coordinates=1e3 * problem.coordinates[:, order],
-    )
+    mixed = renumbered(problem, order, unit=1e3)
     assert np.allclose(
         preconditioner(mixed, name) @ np.eye(34), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max()
     )
@@ -208,13 +203,8 @@ def test_a_closed_line_may_be_numbered_from_anywhere(name):
     order = np.random.default_rng(0).permutation(33)
     rows = (2 * order[:, None] + np.arange(2)).ravel()
     place = (problem.chart.places[0, order] + 1.0) % (2 * np.pi)
-    mixed = replace(
-        problem,
-        Q=problem.Q[np.ix_(rows, rows)],
-        areas=problem.areas[order],
-        coordinates=place[None],
-        chart=Chart(place[None], (False,), 2 * np.pi),
-    )
+    chart = Chart(place[None], (False,), 2 * np.pi)
+    mixed = replace(renumbered(problem, order), coordinates=place[None], chart=chart)
     P = preconditioner(problem, name) @ np.eye(66)
     assert np.allclose(
         preconditioner(mixed, name) @ np.eye(66), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max()

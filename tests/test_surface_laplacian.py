@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg as la
 from scipy.sparse.linalg import cg
 from skfem import MeshQuad, MeshTri
+from turned import renumbered
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.meshes.structured import graded
@@ -134,17 +135,7 @@ def test_numbering_and_units_do_not_matter():
     k = problem.contacts
     order = np.random.default_rng(0).permutation(k)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
-    number = np.argsort(order)
-    chart = Chart(
-        1e3 * problem.chart.places[:, order], (False, False), None, number[problem.chart.cells]
-    )
-    mixed = replace(
-        problem,
-        Q=problem.Q[np.ix_(rows, rows)],
-        areas=1e6 * problem.areas[order],
-        coordinates=1e3 * problem.coordinates[:, order],
-        chart=chart,
-    )
+    mixed = renumbered(problem, order, unit=1e3)
     P = preconditioner(problem, "laplacian") @ np.eye(3 * k)
     R = preconditioner(mixed, "laplacian") @ np.eye(3 * k)
     assert np.allclose(R / np.trace(R), P[np.ix_(rows, rows)] / np.trace(P), atol=1e-9)

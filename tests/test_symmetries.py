@@ -39,18 +39,6 @@ def random_problem(seed: int, dim: int) -> InterfaceProblem:
     )
 
 
-def permuted(problem: InterfaceProblem, order: np.ndarray) -> InterfaceProblem:
-    rows = (problem.dim * order[:, None] + np.arange(problem.dim)).ravel()
-    return InterfaceProblem(
-        problem.Q[np.ix_(rows, rows)],
-        problem.q[order],
-        problem.law.select(order),
-        problem.V[rows],
-        problem.s,
-        problem.areas[order],
-    )
-
-
 def orthogonal(seed: int, dim: int) -> np.ndarray:
     """Tangents (k, dim, dim) turned or mirrored, at every contact in another way; normals stay."""
     rng = np.random.default_rng(seed)
@@ -77,7 +65,7 @@ def certificates(problem: InterfaceProblem, r: np.ndarray, lam: np.ndarray) -> l
 def test_contacts_may_be_numbered_in_any_order(seed, dim):
     problem = random_problem(seed, dim)
     order = np.random.default_rng(seed + 1).permutation(CONTACTS)
-    other = permuted(problem, order)
+    other = turned.renumbered(problem, order)
     a, b = solve(problem, tol=1e-11), solve(other, tol=1e-11)
     assert a.solved and b.solved
     assert np.allclose(b.reactions, a.reactions[order], rtol=0, atol=1e-8)
@@ -128,7 +116,7 @@ def test_forces_and_lengths_may_have_any_unit(seed, dim, force, length):
 def test_every_method_sees_the_same_problem_in_another_frame(name):
     problem = random_problem(3, 2)
     order, R = np.random.default_rng(4).permutation(CONTACTS), orthogonal(5, 2)
-    other = with_tangents(permuted(problem, order), R)
+    other = with_tangents(turned.renumbered(problem, order), R)
     tol = 5e-6 if name == "penalty" else 1e-8
     a, b = (solve(p, name, tol=tol, max_iterations=20_000) for p in (problem, other))
     assert a.status == b.status

@@ -115,18 +115,10 @@ def test_a_start_around_a_closed_line_is_as_good_as_the_answer():
     solved = solve_scene(turned.pin_in_bush())
     problem = solved.reduction.problem
     order = np.roll(np.arange(problem.contacts), 7)
-    rows = (2 * order[:, None] + np.arange(2)).ravel()
     seam = problem.chart.places[0, order]
-    moved = replace(
-        problem,
-        Q=problem.explicit().Q[np.ix_(rows, rows)],
-        q=problem.q[order],
-        law=problem.law.select(order),
-        V=problem.V[rows],
-        areas=problem.areas[order],
-        coordinates=problem.coordinates[:, order],
-        chart=replace(problem.chart, places=((seam - seam[0]) % problem.chart.period)[None]),
-    )
+    places = ((seam - seam[0]) % problem.chart.period)[None]
+    moved = turned.renumbered(problem, order)
+    moved = replace(moved, chart=replace(moved.chart, places=places))
     start = transfer(problem, solved.solution, moved)
     assert np.allclose(start.reactions, solved.solution.reactions[order], atol=1e-12)
     assert solve(moved, start=start).iterations <= 1

@@ -6,7 +6,17 @@ from dataclasses import replace
 import numpy as np
 import skfem
 
-from contactopt import Material, Part, Plate, Rigid, Scene, Support, Traction, scenes
+from contactopt import (
+    InterfaceProblem,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    scenes,
+)
 from contactopt.meshes.structured import graded, patch, rename, tensor_mesh
 
 SOFT, STIFF = Material(5.0, 0.3), Material(20.0, 0.2)
@@ -76,6 +86,23 @@ def moved(scene: Scene, R: np.ndarray) -> Scene:
         return replace(part, **mine)
 
     return replace(scene, upper=part_of(scene.upper), lower=part_of(scene.lower))
+
+
+def renumbered(problem: InterfaceProblem, order: np.ndarray, unit: float = 1.0) -> InterfaceProblem:
+    """The same contacts in another order, and their places in another unit of length."""
+    rows = (problem.dim * order[:, None] + np.arange(problem.dim)).ravel()
+    own = problem.chart
+    cells = None if own.cells is None else np.argsort(order)[own.cells]
+    return replace(
+        problem,
+        Q=problem.explicit().Q[np.ix_(rows, rows)],
+        q=problem.q[order],
+        law=problem.law.select(order),
+        V=problem.V[rows],
+        areas=unit**2 * problem.areas[order],
+        coordinates=unit * problem.coordinates[:, order],
+        chart=replace(own, places=unit * own.places[:, order], cells=cells),
+    )
 
 
 def _even(half: float, length: float, elements: int, growth: float = 1.5) -> np.ndarray:
