@@ -129,13 +129,31 @@ def bulk_data(shape: Shape, order: int, form: str) -> str:
 def _card(words, form: str) -> str:
     words = [f"{word:.6f}"[:8] if isinstance(word, float) else str(word) for word in words]
     name, rest = words[0], words[1:]
-    if form == "commas":
-        lines = [rest[i : i + 8] for i in range(0, len(rest), 8)]
-        return "\n".join(",".join(["" if i else name, *own]) for i, own in enumerate(lines))
-    width, count, mark = (16, 4, "*") if form == "large" else (8, 8, "+")
+    width, count, mark = (16, 4, "*") if "large" in form else (8, 8, "+")
     lines = [rest[i : i + count] for i in range(0, len(rest), count)]
-    first = name + ("*" if form == "large" else "")
+    first = name + ("*" if "large" in form else "")
+    if "commas" in form:
+        mark = mark if "large" in form else ""
+        return "\n".join(",".join([mark if i else first, *own]) for i, own in enumerate(lines))
     return "\n".join(
         f"{mark if i else first:8}" + "".join(f"{word:{width}}" for word in own)
         for i, own in enumerate(lines)
     )
+
+
+def scattered(text: str, form: str) -> str:
+    """Bulk data whose lines that go on a card stand at the end, in turned order, with marks."""
+    sign, (*lines, last) = "*" if "large" in form else "+", text.splitlines()
+    goes_on = [line[0] in "+*," for line in lines] + [False]
+    count = 4 if "large" in form else 8
+    for i, line in enumerate(lines):
+        if "commas" in form:
+            words = line.split(",")
+            words[0] = f"{sign}{i}" if goes_on[i] else words[0]
+            words += [""] * (1 + count - len(words)) + [f"{sign}{i + 1}" * goes_on[i + 1]]
+            lines[i] = ",".join(words)
+        else:
+            begin = f"{sign}{i:<7}" if goes_on[i] else line[:8]
+            lines[i] = f"{begin}{line[8:]:64}" + f"{sign}{i + 1}" * goes_on[i + 1]
+    cards = [line for line, more in zip(lines, goes_on) if not more]
+    return "\n".join([*cards, *(m for m, more in zip(lines[::-1], goes_on[-2::-1]) if more), last])

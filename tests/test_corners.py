@@ -224,7 +224,7 @@ def slanted(rise: float, cells: tuple[int, int], kind: str, degree: int, law: st
         loads = tuple(Pressure(side, 1.0) for side in pressed)
         contact = "high" if name == "lower" else "low"
         parts.append(Part(name, mesh, Material(E, NU), held, loads, contact=contact))
-    pair = Contact("upper", "lower", 0.3, law=law)
+    pair = Contact("upper", "lower", 0.3 * (law == "coulomb"), law=law)
     return Scene("slanted", bodies=tuple(parts), contacts=(pair,), degree=degree)
 
 

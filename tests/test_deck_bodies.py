@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import skfem
-from deck_shapes import block, bulk_data, element_rows, node_rows
+from deck_shapes import block, bulk_data, element_rows, node_rows, scattered
 from test_decks import BRICK, FACE, GROWN, ONE, SQUARE, check, measure
 
 from contactopt import Material, Part, Rigid, Scene, Support, Traction, run
@@ -79,7 +79,7 @@ def test_facets_inside_a_body_are_told(tmp_path, caplog):
 
 @pytest.mark.parametrize("kind", ["tri", "quad", "tet", "hex"])
 @pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("form", ["small", "large", "commas"])
+@pytest.mark.parametrize("form", ["small", "large", "commas", "large commas"])
 def test_bulk_data_in_every_form(tmp_path, kind, order, form):
     shape = block(kind, order, first=11, step=2)
     path = tmp_path / "mesh.bdf"
@@ -88,6 +88,8 @@ def test_bulk_data_in_every_form(tmp_path, kind, order, form):
     for head in ("", "SOL 101\nCEND\nTITLE = GRID\nBEGIN BULK\n$ nodes\n"):
         path.write_text(head + "CELAS2,9000,1.,11,1\n" + text)
         check(path, "7", np.prod(size), {"8": np.prod(size[:-1])}, shape.corners)
+    path.write_text(scattered(text, form) + "\n")
+    check(path, "7", np.prod(size), {"8": np.prod(size[:-1])}, shape.corners)
     last = max(shape.nodes)
     for old, new, words in (
         ("ENDDATA", "", "it ends before ENDDATA"),
@@ -98,7 +100,7 @@ def test_bulk_data_in_every_form(tmp_path, kind, order, form):
         ("ENDDATA", "GRIDG,9001,,1,-9002\nENDDATA", "the card GRIDG is not known"),
         ("ENDDATA", "HEXA,9001,7,1,2,3,4,5,6\nENDDATA", "the card HEXA is not known"),
         ("ENDDATA", "what is this\nENDDATA", "the card WHAT IS is not known"),
-        ("ENDDATA", "CROD,9,9,1,2,,,,,+A\n+B,1.\nENDDATA", "another card than the one above"),
+        ("ENDDATA", "CROD,9,9,1,2,,,,,+A\n+B,1.\nENDDATA", "it goes on no card"),
         ("ENDDATA", "CTETRA,9003,7,11,13,15,9999\nENDDATA", "names node 9999"),
         ("ENDDATA", f"GRID,{last},,0.,0.,0.\nENDDATA", f"node {last} is there twice"),
         ("ENDDATA", "CTETRA,9003,7,11,13,15\nENDDATA", "CTETRA lacks some of its nodes"),

@@ -8,10 +8,13 @@ from scipy.integrate import dblquad, quad
 
 import contactopt
 from contactopt import HalfSpace, InputError, Material, Rigid, Scene, natural_map_residual, scenes
+from contactopt.bodies.half_space import HalfSpaceBody
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.coupling.reduction import reduce_bodies
 from contactopt.linear.convolution import Convolution
 from contactopt.methods.nested import Nested
+from contactopt.readings import peaks
+from contactopt.readings.peaks import largest_around, maxima
 from contactopt.scenes.rough_surfaces import self_affine
 
 STEEL, SOFT = Material(5.0, 0.3), Material(2.0, 0.45)
@@ -27,6 +30,7 @@ def ticks(n, length=10.0):
 
 def ball(n=20, law="coulomb", mu=0.3, shear=0.4, m=None, lower=STEEL, upper=None, **changes):
     """A paraboloid pressed on a square of n x m points and sheared."""
+    mu = 0.0 if law == "frictionless" else mu
     points = (ticks(n), ticks(m or n, 10.0 * (m or n) / n))
     force = {"z": -3.0} | ({"x": shear} if shear else {})
     above = Rigid("ball", gap=lambda x: np.sum(x[:2] ** 2, axis=0) / 20, force=force)
@@ -274,6 +278,38 @@ PUSHED = {"force": {"y": -1.0}, "displacement": {"y": 1.0}}
 def test_bad_input_is_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_local_maxima_on_a_grid_are_those_among_the_nearest_contacts():
+    problem = contactopt.reduce(ball(15))
+    pressure = np.random.default_rng(0).random(problem.contacts)
+    around = np.pad(pressure.reshape(15, 15), 1)
+    window = [around[i : i + 15, j : j + 15] for i in range(3) for j in range(3)]
+    tops = np.flatnonzero(pressure >= np.max(window, axis=0).ravel())
+    best = tops[np.argsort(-pressure[tops])][:8]
+    np.testing.assert_array_equal(maxima(pressure, largest_around(problem, pressure)), best)
+
+
+@pytest.mark.parametrize("width", [1, 2, 5])  # windows that are too small, among them
+def test_a_fit_in_a_window_of_the_grid_is_that_among_all_contacts(width, monkeypatch):
+    reduction = reduce_bodies(ball(31, law="frictionless", shear=0))
+    solution = contactopt.solve(reduction.problem)
+    found, near = [], []
+    for window in (width, 31):
+        monkeypatch.setattr(peaks, "WINDOW", window)
+        found.append(peaks.pressure_reading(reduction, solution))
+        near.append([peaks.around(reduction.problem, contact) for contact in (0, 17, 480)])
+    np.testing.assert_array_equal(*near)
+    assert (found[0].value, found[0].uncertainty) == (found[1].value, found[1].uncertainty)
+    for one, other in zip(*(reading.peaks for reading in found)):
+        np.testing.assert_array_equal(one.sources, other.sources)
+
+
+def test_the_surface_is_made_once(monkeypatch):
+    made, make = [], HalfSpaceBody.surface
+    monkeypatch.setattr(HalfSpaceBody, "surface", lambda *given: made.append(0) or make(*given))
+    contactopt.reduce(ball(12))
+    assert len(made) == 1
 
 
 def test_the_phases_of_a_run_sum_to_its_total(tmp_path):

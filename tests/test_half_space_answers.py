@@ -24,7 +24,7 @@ def test_half_plane_is_hertz_line_contact(law):
         HalfSpace(
             "base", Material(5.0, 0.0) if law == "frictionless" else Material(5.0, 0.4999), x
         ),
-        0.3,
+        0.3 * (law == "coulomb"),
         thickness=10.0,
         law=law,
     )

@@ -27,7 +27,7 @@ def layer(height, cut, cells=(9, 13), below=False, dim=2, **contact):
     flat, wide = dim - 1, 1.5 if dim == 2 else 0.8
     pressed = Traction("top", (0.02, *[0.0] * (dim - 2), -1.0))
     kind = "plane-strain" if dim == 2 else "solid"
-    pair = {"mu": 0.3} | contact
+    pair = {"mu": 0.3 * (contact.get("law") != "tied")} | contact
     if below:
         mesh = box([-0.5] * flat + [-height], [0.5] * flat + [0.0], [cells[0]] * flat + [2], cut)
         thin = Part("layer", mesh, STEEL, contact="top")

@@ -21,6 +21,7 @@ from contactopt import (
 )
 from contactopt.cli import main
 from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.problem.laws import find_law
 from contactopt.scenes import flat_punch
 from contactopt.scenes.contact import Contact
 from contactopt.scenes.scene import BodyForce, Part, Plate, Rigid, Scene, Support, Traction
@@ -177,6 +178,11 @@ def test_a_law_without_friction_needs_no_coefficient():
     for law in ("frictionless", "tied"):
         pair = Contact("punch", "foundation", law=law)
         assert (pair.mu, pair.friction) == (0.0, law)
+        for mu in (0.3, (0.0, 0.3), lambda x: 0.3):
+            with pytest.raises(InputError, match=f"'punch-floor': the law '{law}' reads no mu"):
+                Contact("punch", "floor", mu, law)
+        with pytest.raises(InputError, match="reads no mu"):
+            find_law(law)(0.3)
     with pytest.raises(InputError, match="contact 'a-b' has no mu, which the law 'coulomb' needs"):
         Contact("a", "b")
 

@@ -26,7 +26,7 @@ from contactopt.bodies.assembled import Surface, UndividedBody
 from contactopt.bodies.influence import half_plane_influence, half_space_influence
 from contactopt.bodies.protocol import Seen
 from contactopt.errors import InputError
-from contactopt.linear.convolution import Convolution, Kernel, embedding
+from contactopt.linear.convolution import Kernel, embedding, serves_single
 from contactopt.material import Material, lame
 from contactopt.problem.chart import Chart
 from contactopt.scenes.contact import SIDES
@@ -98,9 +98,9 @@ class HalfSpaceBody(UndividedBody):
         places = np.concatenate([flat, self.outward * self._height(flat)[None]])
         normals = np.zeros((dim, k))
         normals[-1] = self.outward
-        count = np.arange(k + 1)
+        count, ones = np.arange(k + 1, dtype=np.int32), np.ones(k)
         traces = tuple(
-            sp.csr_matrix((np.ones(k), (np.arange(k) * dim + c).astype(np.int32), count), (k, n))
+            sp.csr_matrix((ones, np.arange(c, k * dim, dim, dtype=np.int32), count), (k, n))
             for c in range(dim)
         )
         middle = flat - (flat.max(axis=1) + flat.min(axis=1))[:, None] / 2
@@ -150,10 +150,10 @@ class HalfSpaceBody(UndividedBody):
         return replace(self.kernel, symbols=symbols)
 
     def through(self, T: sp.csr_matrix) -> Seen:
-        back, act = T.T.tocsr(), self._compliance_product
+        act = self._compliance_product
 
         def product(X: np.ndarray, accuracy: float | None) -> np.ndarray:
-            moved = [act(force, accuracy) for force in (back @ X).T]
+            moved = [act(force, accuracy) for force in (T.T @ X).T]
             return np.asarray(T @ np.stack(moved, axis=1))
 
         moved = np.asarray(np.diff(T.indptr) > 0)
@@ -162,10 +162,14 @@ class HalfSpaceBody(UndividedBody):
     def _compliance_product(self, force: np.ndarray, accuracy: float | None = None) -> np.ndarray:
         """C F (n,) for nodal forces F (n,): displacements, followed by the forces."""
         m, dim = self.unknowns, len(self.components)
-        turned = np.roll(force[:m].reshape(-1, dim), 1, axis=1).ravel()
-        operator = Convolution(self.kernel, accuracy)
-        moved = np.roll((operator @ turned).reshape(-1, dim), -1, axis=1).ravel()
-        return np.concatenate([moved, force[:m], np.zeros(dim)])
+        U, every = np.zeros(2 * m + dim), tuple(range(dim))
+        F = np.moveaxis(force[:m].reshape(*self.grid, dim), -1, 0)
+        turned = [F[(c - 1) % dim] for c in every]  # n is the last component
+        moved = self.kernel.act(turned, every, every, serves_single(accuracy))
+        for c, own in enumerate(moved):
+            U[(c - 1) % dim : m : dim] = own.ravel()
+        U[m : 2 * m] = force[:m]
+        return U
 
     def _entries(self, T: sp.csr_matrix) -> np.ndarray:
         k, dim = int(np.prod(self.grid)), len(self.components)
@@ -178,9 +182,10 @@ class HalfSpaceBody(UndividedBody):
     def displacement(
         self, force: np.ndarray, multipliers: np.ndarray, free: np.ndarray | None = None
     ) -> np.ndarray:
-        return np.asarray(
-            self.at_rest + self.fields @ multipliers + self._compliance_product(force)
-        )
+        U = self._compliance_product(force)
+        if np.any(self.given) or len(multipliers):
+            U += self.at_rest + self.fields @ multipliers
+        return U
 
     def material_change(
         self, constant: str, U: np.ndarray, force: np.ndarray

@@ -72,9 +72,9 @@ class RigidBody(UndividedBody):
                 other.body,
             )
         fixed = np.array([name not in (self.part.force or {}) for name in self.components])
+        count, ones = np.arange(k + 1, dtype=np.int32), np.ones(k)
         traces = tuple(
-            sp.csr_matrix((np.ones(k), (np.arange(k), np.full(k, c))), (k, 2 * dim))
-            for c in range(dim)
+            sp.csr_matrix((ones, np.full(k, c, np.int32), count), (k, 2 * dim)) for c in range(dim)
         )
         held = np.tile(fixed[:, None], k)
         surface = replace(

@@ -20,7 +20,7 @@ from importlib import import_module
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.bodies.assembled import AssembledBody
+from contactopt.bodies.assembled import AssembledBody, UndividedBody
 from contactopt.cards import count
 from contactopt.checks import place_words
 from contactopt.coupling.patch_test import misfit
@@ -142,7 +142,8 @@ def couple(
 def tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, AssembledBody]) -> Coupling:
     """Every coupling's contract: constant pressure gives consistent nodal forces, or it `fails`."""
     surfaces = tuple(
-        body.surface(name) if body.meshed else None for body, name in zip(bodies, pair.surfaces)
+        None if isinstance(body, UndividedBody) else body.surface(name)
+        for body, name in zip(bodies, pair.surfaces)
     )
     if (found := misfit(made, surfaces)) is None:
         return replace(made, fails="") if made.fails else made
@@ -210,20 +211,23 @@ def local_map(
     shape = k * dim, traces[0].shape[1]
     if all(np.array_equal(trace.indptr, np.arange(trace.shape[0] + 1)) for trace in traces):
         # every component of a contact is one unknown of the body, times a number
+        if frames.strides[0] == 0 and np.all(np.count_nonzero(frames[0], axis=1) == 1):
+            # one frame for all, which swaps axes and no more
+            columns = np.empty((k, dim), traces[0].indices.dtype)
+            data = np.empty((k, dim))
+            for row, c in enumerate(np.argmax(frames[0] != 0, axis=1)):
+                columns[:, row] = traces[c].indices[contacts]
+                np.multiply(traces[c].data[contacts], frames[0, row, c], out=data[:, row])
+            ends = np.arange(k * dim + 1, dtype=columns.dtype)
+            return sp.csr_matrix((data.ravel(), columns.ravel(), ends), shape)
         unknowns = np.stack([trace.indices[contacts] for trace in traces], axis=1)
         values = np.stack([trace.data[contacts] for trace in traces], axis=1)
-        if frames.strides[0] == 0:  # one frame for all, which usually swaps axes and no more
-            row, column = np.nonzero(frames[0])
-            count = np.tile(np.bincount(row, minlength=dim), k)
-            data = np.take(values, column, axis=1) * frames[0][row, column]
-            columns = np.take(unknowns, column, axis=1)
-        else:
-            used = frames != 0
-            count = np.count_nonzero(used, axis=2)
-            data = (frames * values[:, None])[used]
-            columns = np.broadcast_to(unknowns[:, None], frames.shape)[used]
+        used = frames != 0
+        count = np.count_nonzero(used, axis=2)
+        data = (frames * values[:, None])[used]
+        columns = np.broadcast_to(unknowns[:, None], frames.shape)[used]
         ends = np.append(0, np.cumsum(count))
-        T = sp.csr_matrix((data.ravel(), columns.ravel(), ends), shape)
+        T = sp.csr_matrix((data, columns, ends), shape)
         T.sort_indices()
         return T
     rows, own = np.arange(k * dim), np.repeat(np.arange(k), dim)

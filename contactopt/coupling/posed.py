@@ -97,6 +97,8 @@ def _signed_map(
         made.upper if body is upper else -made.lower if body is lower else None
         for (upper, lower), made in zip(sides, couplings)
     ]
+    if len(blocks) == 1 and blocks[0] is not None:
+        return blocks[0]
     n = next(block.shape[1] for block in blocks if block is not None)
     none = [sp.csr_matrix((made.upper.shape[0], n)) for made in couplings]
     return sp.csr_matrix(sp.vstack([b if a is None else a for a, b in zip(blocks, none)]))

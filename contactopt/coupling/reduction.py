@@ -114,7 +114,8 @@ class Reduction:
     @property
     def frames(self) -> np.ndarray:
         """The directions n, t1[, t2] of all contacts as rows (k, dim, dim)."""
-        return np.concatenate([made.frames for made in self.couplings])
+        parts = [made.frames for made in self.couplings]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     @property
     def operator(self) -> InterfaceOperator:
@@ -299,7 +300,8 @@ def reduce_bodies(
         check_dense(round(filling(maps) ** 0.5))
     with one_blas_thread() if iterate else nullcontext():
         bodies = each(lambda body: body.prepare(solver, not implicit), assembled)
-        give_back()
+        if any(body.work.stiffness for body in assembled):
+            give_back()
     times.append(time.perf_counter())
 
     form = compliance(bodies, maps, couplings, implicit)

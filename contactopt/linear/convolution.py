@@ -15,6 +15,7 @@ or i, M0 (M1 / 2 + 1) of them for each pair (a, b).
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -76,15 +77,17 @@ class Kernel:
             odd, symbol = _odd_axes(a, b, len(grid)), part
             for axis in range(len(grid)):
                 if odd[axis]:
-                    inner = np.take(symbol, range(1, symbol.shape[axis] - 1), axis)
-                    ends = [(int(i == axis),) * 2 for i in range(len(grid))]
-                    symbol = np.pad(-dst(inner, 1, axis=axis), ends)
+                    inner = (slice(None),) * axis + (slice(1, -1),)
+                    values, symbol = dst(symbol[inner], 1, axis=axis), np.zeros(symbol.shape)
+                    np.negative(values, out=symbol[inner])
                 else:
                     symbol = dct(symbol, 1, axis=axis)
             if len(grid) == 2:  # the frequencies beyond the middle
-                mirrored = symbol[-2:0:-1]
-                symbol = np.concatenate([symbol, -mirrored if odd[0] else mirrored])
-            symbols[a, b] = -symbol if all(odd) and len(grid) == 2 else symbol
+                half, sign = len(symbol), -1.0 if all(odd) else 1.0
+                part, symbol = symbol, np.empty((2 * half - 2, symbol.shape[1]))
+                np.multiply(part, sign, out=symbol[:half])
+                np.multiply(part[-2:0:-1], -sign if odd[0] else sign, out=symbol[half:])
+            symbols[a, b] = symbol
         return cls(grid, padded, symbols)
 
     @property
@@ -153,7 +156,11 @@ class Kernel:
         return Kernel(tuple(-(-n // 2) for n in self.grid), halved, symbols)
 
     def act(
-        self, x: np.ndarray, rows: tuple[int, ...], columns: tuple[int, ...], single: bool = False
+        self,
+        x: Iterable[np.ndarray],
+        rows: tuple[int, ...],
+        columns: tuple[int, ...],
+        single: bool = False,
     ) -> np.ndarray:
         """Displacements (rows, n0[, n1]) [length] under forces x (columns, n0[, n1]) [force]."""
         symbols, kind = (self.single, np.float32) if single else (self.symbols, np.float64)
@@ -191,6 +198,11 @@ class Kernel:
             Q[:, a, :, b] = values
             Q[:, b, :, a] = values.T
         return Q.reshape(k * dim, k * dim)
+
+
+def serves_single(accuracy: float | None) -> bool:
+    """Whether products in single precision are accurate enough."""
+    return accuracy is not None and accuracy >= 2e-6
 
 
 def forward(x: np.ndarray, padded: tuple[int, ...]) -> np.ndarray:
@@ -243,7 +255,7 @@ class Convolution(InterfaceOperator):
 
     def _product(self, X: np.ndarray, accuracy: float | None) -> np.ndarray:
         every = tuple(range(self.kernel.dim))
-        single = accuracy is not None and accuracy >= 2e-6  # from which on it serves
+        single = serves_single(accuracy)
         out = np.empty(X.shape)
         for column in range(X.shape[1]):
             parts = X[:, column].reshape(*self.kernel.grid, self.kernel.dim)

@@ -2,7 +2,8 @@
 
 meshio reads no file without BEGIN BULK, such as those of Gmsh, nor elements in large fields, and
 passes over cards and coordinate systems that it does not know. A card has fields between commas, or
-of 8 or 16 characters (a name with *); it goes on in lines that begin with +, * or an empty field.
+of 8 or 16 characters (a name with *); it goes on in lines that begin with +, * or an empty field,
+which may stand elsewhere if they begin with the mark at its end.
 Elements without an extent are passed over. A card of an element that is not known is refused, as is
 a node in a coordinate system of its own. The number of its property names the group of an element.
 
@@ -161,33 +162,50 @@ class _Reader:
 
 
 def _cards(path: Path) -> Iterator[Card]:
-    """Line and fields of each card of the bulk data, with the lines in which it goes on."""
+    """Line and fields of each card of the bulk data, with the lines in which it goes on: those
+    below it and, by their marks, those that stand elsewhere.
+    """
+    lines = list(_lines(path))
+    ends = {mark for _, _, mark in lines if mark}
+    cards: list[Card] = []
+    waits: list[str] = []  # the mark with which each card goes on
+    others: dict[str, list[tuple[int, list[str], str]]] = {}
+    for number, fields, end in lines:
+        mark = fields[0].lstrip("+*")
+        if fields[0] and fields[0][0] not in "+*":
+            cards.append((number, fields))
+            waits.append(end)
+        elif mark and mark not in waits[-1:] and (mark in ends or waits[-1:] != [""]):
+            others.setdefault(mark, []).append((number, fields[1:], end))
+        elif not cards:
+            raise Damaged("it begins within a card")
+        else:
+            cards[-1][1].extend(fields[1:])
+            waits[-1] = end
+    for (_, fields), mark in zip(cards, waits) if others else ():
+        while len(others.get(mark, ())) == 1:
+            _, more, mark = others.pop(mark)[0]
+            fields.extend(more)
+    for (number, _, _), *_ in others.values():
+        said = f"line {number}: it goes on no card, or one that goes on twice"
+        raise InputError(f"mesh file '{path}', {said}; put it below its card.")
+    yield from cards
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[str], str]]:
+    """Number and fields of each line of the bulk data, and the mark at its end."""
     lines = text_of(path).splitlines()
     begin = [n for n, line in enumerate(lines) if re.match(r"\s*BEGIN\b", line, re.IGNORECASE)]
     if len(begin) > 1:
         raise InputError(f"mesh file '{path}', line {begin[1] + 1}: it holds more than one BEGIN.")
-    card, waits = None, ""
-    for number, line in enumerate(lines[begin[0] + 1 :] if begin else lines, 1):
-        number += begin[0] + 1 if begin else 0
+    first = begin[0] + 1 if begin else 0
+    for number, line in enumerate(lines[first:], first + 1):
         line = line.split("$")[0].rstrip().expandtabs(8)
-        if not line:
-            continue
-        fields, goes_on = _fields(line)
-        if line[0] in "+*" or not fields[0]:
-            if card is None:
-                raise Damaged("it begins within a card")
-            mark = fields[0].lstrip("+*")
-            if mark and waits and mark != waits:
-                said = f"line {number}: it goes on another card than the one above"
-                raise InputError(f"mesh file '{path}', {said}; put it below that one.")
-            waits = goes_on
-            card[1].extend(fields[1:])
-            continue
-        if card is not None:
-            yield card
-        if fields[0] == "ENDDATA":
+        fields, end = _fields(line) if line else ([], "")
+        if fields[:1] == ["ENDDATA"]:
             return
-        card, waits = (number, fields), goes_on
+        if line:
+            yield number, fields, end
     raise InputError(f"mesh file '{path}', line {len(lines)}: it ends before ENDDATA.")
 
 
@@ -197,7 +215,7 @@ def _fields(line: str) -> tuple[list[str], str]:
     """
     if "," in line:
         fields = [word.strip() for word in line.upper().split(",")]
-        count = 4 if fields[0].endswith("*") else 8
+        count = 4 if "*" in fields[0] else 8
         fields += [""] * (2 + count - len(fields))
         if len(fields) > 10:  # a long line
             count = len(fields)

@@ -281,8 +281,8 @@ def _boundaries(
         inside = np.all(there[corners], axis=0)
         if np.any(there & ~skin):
             log.info("the nodes %s fill the body, or a part of it: they are no boundary", name)
-        elif inside.any() and name not in found:
-            found[name] = outer[inside]
+        elif inside.any() and set(found.setdefault(name, outer[inside])) != set(outer[inside]):
+            log.warning("facets and other nodes are both named %s; the facets are taken", name)
     return found
 
 

@@ -227,10 +227,10 @@ def _disc(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) ->
 def is_round(problem: InterfaceProblem, inside: np.ndarray) -> bool:
     """Whether a zone on a surface, scaled to equal axes, is more an ellipse than a rectangle."""
     areas = problem.areas
-    x = _from_centre(problem, inside, areas)
-    scaled, _ = _as_disc(problem, x, inside, areas)
-    disc = np.sqrt(areas[inside].sum() / np.pi)
-    return bool(np.linalg.norm(scaled[:, inside], axis=0).max() <= 1.12 * disc)  # a disc has 1
+    x, own = _from_centre(problem, inside, areas)[:, inside], areas[inside]
+    scaled, _ = _as_disc(problem, x, slice(None), own)
+    disc = np.sqrt(own.sum() / np.pi)
+    return bool(np.linalg.norm(scaled, axis=0).max() <= 1.12 * disc)  # a disc has 1
 
 
 def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -241,7 +241,7 @@ def _from_centre(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndar
 
 
 def _as_disc(
-    problem: InterfaceProblem, x: np.ndarray, inside: np.ndarray, weights: np.ndarray
+    problem: InterfaceProblem, x: np.ndarray, inside: np.ndarray | slice, weights: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Places (2, k) scaled at equal area to the moments of a disc, and the largest factor."""
     moments = (x[:, inside] * weights[inside]) @ x[:, inside].T

@@ -116,9 +116,14 @@ def neighbours(problem: InterfaceProblem) -> np.ndarray:
 
 def around(problem: InterfaceProblem, contact: int) -> np.ndarray:
     """Numbers of the contacts nearest to one, itself among them."""
-    places, node = _surroundings(problem)
-    far = np.linalg.norm(places - problem.chart.places[:, [contact]], axis=0)
-    return np.asarray(node[least(far, min(NEIGHBOURS[problem.dim], len(node)))])
+    near = np.empty(0, dtype=int)
+    for places, node, radius in _widening(problem, contact):
+        far = np.linalg.norm(places - problem.chart.places[:, [contact]], axis=0)
+        nearest = least(far, min(NEIGHBOURS[problem.dim], len(node)))
+        near = node[nearest]
+        if far[nearest].max() < radius and len(near) == NEIGHBOURS[problem.dim]:
+            break
+    return near
 
 
 def maxima(sizes: np.ndarray, largest: np.ndarray) -> np.ndarray:

@@ -81,7 +81,8 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     moved = reduction.seen(displaced)
     scale, none = np.zeros(len(moved)), TOL * float(np.abs(reactions).sum())
     for body, B, U in zip(reduction.bodies, reduction.maps, displaced):
-        known = bodies[body.name] = limits(body, U, B.T @ reactions, none)._asdict()
+        force = reactions[:0] if body.view is None else B.T @ reactions
+        known = bodies[body.name] = limits(body, U, force, none)._asdict()
         for key in ("strain", "rotation"):
             remarks += _beyond(key, f"body '{body.name}'", known[key])
         if known["imbalance"] > BOUNDS["imbalance"]:
@@ -96,16 +97,16 @@ def validity(reduction: Reduction, solution: Solution) -> tuple[dict[str, Any], 
     status, pairs = contact_status(reduction.problem, solution.reactions), {}
     for pair, made in zip(reduction.problem.pairs, reduction.couplings):
         own, touching = pair.contacts, status.touching[pair.contacts]
-        size = _sizes(made.cells[:, touching[made.cells].any(axis=0)], made.positions)
+        size = _sizes(made.cells[:, touching[made.cells].any(axis=0)], made.positions)[touching]
         extent = float(np.ptp(made.positions, axis=1).max(initial=0.0))
-        slip = np.linalg.norm(moved[own, 1:], axis=1) / size
-        closure = np.where(made.gap > SHARE * extent, made.gap / size, 0.0)
+        slip, gap = np.linalg.norm(moved[own, 1:][touching], axis=1) / size, made.gap[touching]
+        closure = np.where(gap > SHARE * extent, gap / size, 0.0)
         # the others open as they slip
         close = status.stick[own] if reduction.problem.law.dilatant else touching
         missed = np.abs(moved[own, 0])[close].max(initial=0.0)
         misfit = float(missed / max(scale[own].max(initial=0.0), 1e-300))
         moves = {"slip": slip, "closure": closure}
-        largest = {key: float(of[touching].max(initial=0.0)) for key, of in moves.items()}
+        largest = {key: float(of.max(initial=0.0)) for key, of in moves.items()}
         pairs[pair.name] = largest | {"misfit": misfit}
         for key in ("slip", "closure"):
             remarks += _beyond(key, f"pair '{pair.name}'", largest[key])

@@ -44,8 +44,8 @@ def meshed_blocks(
         material = Material(float(modulus[i]), 0.3)
         bodies.append(Part(f"block {i}", mesh, material, held, load, contact="bottom"))
         if i:
-            law = "tied" if tied and i == 1 else "coulomb"
-            contacts.append(Contact(f"block {i}", f"block {i - 1}:top", mu, law=law))
+            law, own = ("tied", 0.0) if tied and i == 1 else ("coulomb", mu)
+            contacts.append(Contact(f"block {i}", f"block {i - 1}:top", own, law=law))
     scene = Scene("blocks", bodies=tuple(bodies), contacts=tuple(contacts), kind="plane-strain")
     return problem_of(scene)
 

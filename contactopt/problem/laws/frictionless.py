@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from contactopt.errors import InputError
 from contactopt.problem.laws.law import Law, Projected
-from contactopt.problem.laws.place import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,15 +21,11 @@ class Frictionless(Law):
     proportional = True
     frictional = False
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if np.any(self.mu):
-            raise InputError(
-                "contact without friction has mu = 0; for another value use the law 'coulomb'."
-            )
-
     def idle(self, y: np.ndarray) -> np.ndarray:
         return np.asarray(y[:, 0] <= 0)
+
+    def sticking(self, r: np.ndarray) -> np.ndarray:
+        return np.zeros(len(r), dtype=bool)
 
     def bound(self, r_n: np.ndarray) -> np.ndarray:
         return np.zeros(len(r_n))
@@ -48,8 +42,3 @@ class Frictionless(Law):
         out = np.zeros(y.shape)
         out[:, 0] = np.maximum(y[:, 0], 0.0)
         return out
-
-    @classmethod
-    def of_place(cls, values: np.ndarray, place: Place) -> Frictionless:
-        """Whatever the value that the scene gives: it has no meaning for this law."""
-        return cls(np.zeros(len(place.areas)))

@@ -67,6 +67,11 @@ class Law:
                 known = {"mu": "the friction coefficient mu", "limit": "the friction bound"}
                 what, least = known.get(name, name), value.min()
                 raise InputError(f"{what} must not be negative; its least value is {least:g}.")
+            if np.any(value) and not self.frictional:
+                raise InputError(
+                    f"the law {type(self).__name__} reads no {name}; leave it out or give 0, or"
+                    " take a law with friction."
+                )
             value = np.minimum(value, LARGEST)  # nothing slips long before
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -207,6 +212,7 @@ class Law:
 
     def shifted(self, change: np.ndarray) -> Self:
         """The law with `change` (k,) added to its parameter, which does not fall below zero."""
+        change = change if self.frictional else 0.0 * change
         return self._mapped(lambda parameter: np.maximum(parameter + change, 0.0))
 
     def select(self, contacts: np.ndarray) -> Law:
@@ -229,7 +235,10 @@ class Law:
 
     @classmethod
     def of_place(cls, values: np.ndarray, place: Place) -> Law:
-        """The law of k contacts from a scene's values, one or (k,); InputError for other shapes."""
+        """The law of k contacts from a scene's values, one or (k,); InputError for other shapes.
+        A law without friction does not look at them.
+        """
+        values = values if cls.frictional else np.zeros(place.areas.shape)
         if values.shape not in ((), place.areas.shape):
             raise InputError(
                 "the friction of a scene must be one number or one per contact, shape"

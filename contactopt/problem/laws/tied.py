@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from contactopt.problem.laws.law import Law, Projected
-from contactopt.problem.laws.place import Place
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +31,3 @@ class Tied(Law):
 
     def nearest_derivative(self, y: np.ndarray, r_n: np.ndarray) -> Projected:
         return y.copy(), np.broadcast_to(np.eye(y.shape[1]), (*y.shape, y.shape[1])).copy()
-
-    @classmethod
-    def of_place(cls, values: np.ndarray, place: Place) -> Tied:
-        """Whatever the value that the scene gives: it has no meaning for this law."""
-        return cls(np.zeros(len(place.areas)))

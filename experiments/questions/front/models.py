@@ -143,7 +143,7 @@ def punch(name: str, mu: float) -> list[Model]:
         Model(name, "section, linear", plain, LINEAR[2:]),
         Model(name, "section, quadratic", lambda: replace(made, degree=2), QUADRATIC[2:-1]),
         Model(name, "section, small body", lambda: flat(DISC, mu, SMALL), FEW, "body"),
-        Model(name, "section, tied", with_law(plain, "tied"), FEW, "law"),
+        Model(name, "section, tied", with_law(plain, "tied", 0.0), FEW, "law"),
     ]
     if mu:
         models += [

@@ -33,8 +33,9 @@ def pressed(kind: str, n: int, law: str, shear: float = 0.0) -> Scene:
     force = 0.005 * contact_modulus(MATERIAL) * LENGTH**2
     load = {"z": -force} | ({"x": shear * MU * force} if shear else {})
     lower = HalfSpace("half-space", MATERIAL, (ticks(n), ticks(n)))
+    mu = 0.0 if law == "frictionless" else MU
     return Scene(
-        kind, Rigid("body", gap=gap_of(kind, n), force=load), lower, MU, kind="solid", law=law
+        kind, Rigid("body", gap=gap_of(kind, n), force=load), lower, mu, kind="solid", law=law
     )
 
 

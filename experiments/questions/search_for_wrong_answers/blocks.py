@@ -187,7 +187,8 @@ def stack(rng: Random, layers: int = 2) -> Case:
     pairs = tuple((f"body {i + 1}:under", f"body {i}:over") for i in range(layers - 1))
     thinnest = min(2 * (c[2][1] - c[1][1]) for c in corners)
     size = min([thinnest] + [(c[1][0] - c[0][0]) / 8 for c in corners[1:]])
-    scene = Blocks(tuple(made), pairs, mu * force if law == "tresca" else mu, size, depth, law)
+    mu = {"coulomb": mu, "tresca": mu * force, "tied": 0.0}[law]
+    scene = Blocks(tuple(made), pairs, mu, size, depth, law)
     return scene.case(f"{layers} blocks", rng, loose=1.001 * gaps)
 
 
