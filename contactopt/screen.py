@@ -30,7 +30,7 @@ def in_tables(title: str, table: Sequence[Sequence[str]], rows: Mapping[str, str
         numbers.add_column(name, justify="right" if number else "left", no_wrap=number > 0)
     for row in body:
         numbers.add_row(*row)
-    words.add_column(style="dim", max_width=26)
+    words.add_column(style="dim", max_width=26, overflow="fold")
     for name, text in rows.items():
         words.add_row(name, Text(text, _style(name, text)))
     with console.capture() as shown:

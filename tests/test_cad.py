@@ -83,6 +83,21 @@ def test_faces_are_named_by_their_outward_normals_and_measure_what_they_should(p
     assert 0.1 < np.linalg.norm(edges[:, 0] - edges[:, 1], axis=0).mean() < 0.35
 
 
+def test_what_is_nothing_beside_the_size_is_printed_as_0(tmp_path, monkeypatch, capsys):
+    import gmsh
+
+    monkeypatch.chdir(tmp_path)
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.occ.addSphere(0, 0, 0, 5)
+    gmsh.model.occ.synchronize()
+    gmsh.write("ball.step")
+    gmsh.finalize()
+    assert main(["mesh", "ball.step", "--size", "2", "--no-page", "-q"]) == 0
+    told = capsys.readouterr().out
+    assert "middle (0, 0, 0), radius 5" in told, told
+
+
 def test_the_printed_beginning_of_a_scene_is_solved_as_our_own_mesh_is(parts, capsys):
     """Tetrahedra of Gmsh and our bricks give the same force, and nearly the same approach."""
     draw(bored=False)

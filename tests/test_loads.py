@@ -13,6 +13,7 @@ from contactopt import (
     InputError,
     Material,
     Part,
+    Plate,
     Pressure,
     Rigid,
     Scene,
@@ -222,3 +223,10 @@ def test_a_load_inside_a_body_may_differ_from_place_to_place(tmp_path):
         "block:body_force:x": (0.0, False), "block:body_force:y": (-1.0, False),
         "block:spin": (4.0, False),
     }  # fmt: skip
+
+
+def test_a_glued_plate_says_what_it_holds():
+    """In the directions without a force it is a support, which bears a part of other loads."""
+    plate = Plate("end", {"x": 5.0})
+    assert plate.words(("x", "y", "z")) == "plate on 'end': x = 5; glued, it holds y, z"
+    assert replace(plate, glued=False).words(("x", "y")) == "plate on 'end': x = 5"

@@ -220,6 +220,12 @@ def test_elsewhere_progress_is_made_of_lines(capsys, monkeypatch):
         assert quiet or told.err.endswith("runs: 5 of 5, 1 timeout\n")
 
 
+def test_no_name_of_a_row_is_cut():
+    name = "pressure:ball.sphere1-inner.torus1"
+    shown = screen.in_tables("a", [("contact", "peak")], {name: "1 MPa"})
+    assert "".join(line[:26].strip() for line in shown.splitlines()[2:]) == name
+
+
 def test_a_terminal_has_colours_and_names_in_brackets_stay():
     program = (
         "from contactopt.screen import in_tables\n"

@@ -72,12 +72,18 @@ class Locally:
         self.values: list[float] = []
         self.errors: list[ElementErrors] = []
         self.last: Solved | None = None
-        self.splits = 0
 
-    def _see(self) -> None:
-        """Divide elements at contacts that are too small for the first mesh."""
-        if self.unseen:
-            see = partial(seeing, contacts=self.unseen, across=self.across, shapes=self.shapes)
+    def _see(self, peaks: Sequence[Peak] = ()) -> None:
+        """Divide elements at contacts too small for the first mesh; with peaks, only at theirs."""
+        found = self.unseen
+        if peaks:
+            places = np.transpose([peak.place for peak in peaks])
+            found = {
+                body: [own for own in made if own.away(places).min() <= own.size]
+                for body, made in found.items()
+            }
+        if found:
+            see = partial(seeing, contacts=found, across=self.across, shapes=self.shapes)
             self.states = [see(scene) for scene in self.states]
 
     def solve(self) -> Solved:
@@ -123,9 +129,8 @@ class Locally:
         return len(self.values) > (1 if self.unseen else 2)
 
     def facts(self, solved: Solved) -> dict[str, Any]:
-        if not self.whole:
-            return {}
-        return {"elements": self.states[-1].elements, "splits": len(self.values)}
+        made = {"elements": self.states[-1].elements, "splits": len(self.values)}
+        return made if self.whole else {}
 
     def advance(
         self, judged: Judged, reading: Reading, contacts: np.ndarray, rivals: Sequence[Peak]
@@ -154,7 +159,7 @@ class Locally:
         self.states = [finer(scene, marked, self.shapes) for scene in self.states]
         if reading.uncertainty > judged.size / 3:
             self.across *= 2
-            self._see()
+            self._see(reading.peaks)
         return float(unknowns(self.states[-1]))
 
     def geometry(self, value: float, before: list[Scene]) -> tuple[float, str]:

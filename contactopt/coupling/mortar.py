@@ -81,7 +81,7 @@ from contactopt.coupling.faces import NEWTON, Faces, cross, evaluate
 from contactopt.coupling.levers import levers, rotations_times
 from contactopt.coupling.mortar_matrices import Integrals, collect, integrate, tidy
 from contactopt.coupling.segments import Overlap, overlap
-from contactopt.defaults import EQUAL
+from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 
 NUDGE = 0.05  # of the way to the centre of a face: about the first point of integration on it
@@ -188,7 +188,7 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     x = mine.points[:, nodes]
     fixed = ~sums.partial if mine.mirror is None else ~sums.partial | mine.mirror[:, nodes]
     x = np.where(fixed, x, (sums.own @ mine.points.T).T)
-    if sums.least < -EQUAL * np.ptp(mine.points, axis=1).max():
+    if sums.least < -CLOSE * np.ptp(mine.points, axis=1).max():
         where = place_words(sums.nearest)
         said = "bodies '%s' and '%s' overlap initially, by up to %.3g at (%s)"
         _log.warning(said, upper.name, lower.name, -sums.least, where)

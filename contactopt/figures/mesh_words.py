@@ -10,11 +10,11 @@ from skfem import Mesh
 
 from contactopt.bodies.elements import Faces
 from contactopt.cards import count
-from contactopt.defaults import EQUAL
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
 UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
 DEGREE = 4  # of the quadrature of volumes and areas
+DIGITS = 1e-5  # share of a size that is shown
 SHAPE = 0.02  # by how much a boundary may be off a plane or a circle [of 1, of its radius]
 
 
@@ -25,7 +25,8 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
     inside, side = ("volume", "area") if solid else ("area", "length")
     lines = [f'kind = "{"solid" if solid else "plane-strain"}"', UNITS]
     for (name, mesh), group in zip(named.items(), meshes):
-        low, high = _place(mesh, mesh.p.min(axis=1)), _place(mesh, mesh.p.max(axis=1))
+        size = np.abs(mesh.p).max()
+        low, high = _place(mesh.p.min(axis=1), size), _place(mesh.p.max(axis=1), size)
         lines.append(
             f"\n[bodies.{name}]  # {count(mesh.nelements, 'element')},"
             f" {inside} {_measure(mesh)[0]:.5g}"
@@ -36,16 +37,16 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
         for boundary, facets in (mesh.boundaries or {}).items():
             area, middle = _measure(mesh, np.asarray(facets))
             lines.append(
-                f"# boundary {boundary!r}: {side} {area:.5g}, middle {_place(mesh, middle)}"
+                f"# boundary {boundary!r}: {side} {area:.5g}, middle {_place(middle, size)}"
                 + _shape(mesh, np.asarray(facets))
             )
     pairs = facing_boundaries(named, usual_distance(named)) if len(named) > 1 else []
     return "\n".join([*lines, *(["", as_toml(pairs, 0.3, "mm")] if pairs else [])]), named
 
 
-def _place(mesh: Mesh, x: np.ndarray) -> str:
-    """Coordinates in brackets."""
-    shown = np.where(np.abs(x) < EQUAL * np.abs(mesh.p).max(), 0.0, x)
+def _place(x: np.ndarray, size: float = 1.0) -> str:
+    """Coordinates in brackets; what is nothing beside the size is 0."""
+    shown = np.where(np.abs(x) < DIGITS * size, 0.0, x)
     return "(" + ", ".join(f"{value:.5g}" for value in shown) + ")"
 
 
@@ -71,7 +72,7 @@ def _shape(mesh: Mesh, facets: np.ndarray) -> str:
     x, n = (f.reshape(len(mesh.p), -1) for f in (at.places, at.normals))
     mean = n.mean(axis=1, keepdims=True)
     if np.abs(n - mean).max() < SHAPE:
-        return f", normal {_place(mesh, (mean / np.linalg.norm(mean)).ravel())}"
+        return f", normal {_place((mean / np.linalg.norm(mean)).ravel())}"
     values, axes = np.linalg.eigh(n @ n.T / n.shape[1])
     if len(n) == 3 and values[0] < SHAPE**2:
         x, n = (axes[:, 1:].T @ field for field in (x, n))

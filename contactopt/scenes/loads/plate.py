@@ -29,6 +29,10 @@ class Plate(Load):
     def values(self, components: tuple[str, ...]) -> dict[str, float]:
         return dict(self.force)
 
+    def words(self, components: tuple[str, ...]) -> str:
+        held = ", ".join(c for c in components if self.glued and c not in self.force)
+        return super().words(components) + (f"; glued, it holds {held}" if held else "")
+
     def with_values(self, values: Mapping[str, float]) -> Plate:
         return replace(self, force=dict(values))
 
