@@ -1,6 +1,4 @@
-"""A headless Chromium that opens a page, answers questions about it and takes pictures, over its
-debugging protocol.
-"""
+"""A headless Chromium that opens a page, answers questions about it and takes pictures."""
 
 import asyncio
 import base64
@@ -17,15 +15,10 @@ CHROMIUM = (
     shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
 )
 OPTIONS = (
-    "--headless",
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
+    "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+    "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--remote-debugging-port=0",
-)
+)  # fmt: skip
 
 
 class Browser:

@@ -69,18 +69,16 @@ def one_contact(force: tuple[float, float], mu: float) -> InterfaceProblem:
     return InterfaceProblem(W[np.ix_(swap, swap)], [-(W @ force)[swap]], mu)
 
 
-def block(kind: str, low: float, high: float, cells: int = 4, width: float = 1.0):
-    """Unit-wide block between two heights: square, cylinder's section or cube; boundaries side0..,
-    top, bottom.
-    """
-    across = np.linspace(0.0, width, cells + 1) ** 1.3  # uneven on purpose
+def block(kind: str, low: float, high: float, cells=4, width=1.0, layers=None, power=1.3):
+    """Unit-wide block between two heights: square, cylinder's section or cube."""
+    across = np.linspace(0.0, width, cells + 1) ** power  # uneven on purpose
     grids = [across] * (2 if kind == "solid" else 1)
     up = "z" if kind == "solid" else "y"
     names = {f"side{i}": f"{'xy'[i]}-" for i in range(len(grids))} | {
         "top": f"{up}+",
         "bottom": f"{up}-",
     }
-    return rename(tensor_mesh(*grids, np.linspace(low, high, cells)), **names)
+    return rename(tensor_mesh(*grids, np.linspace(low, high, layers or cells)), **names)
 
 
 def two_blocks(kind: str, force: float = 3.0, mu: float = 0.0, material=MATERIAL) -> Scene:

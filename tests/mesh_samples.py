@@ -19,10 +19,7 @@ def volume(mesh):
 
 
 def flux(mesh, boundary=None):
-    """Integral of x .
-
-    n, the normal as contact uses it; dim times the volume on the whole surface.
-    """
+    """Integral of x . n, the normal as contact uses it."""
     facets = mesh.boundary_facets() if boundary is None else mesh.boundaries[boundary]
     at = skfem.FacetBasis(mesh, mesh.elem(), facets=facets, intorder=8)
     return np.sum(np.asarray(at.normals) * np.asarray(at.global_coordinates()) * at.dx)

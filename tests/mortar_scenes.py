@@ -16,7 +16,7 @@ from contactopt.coupling.faces import faces_of
 from contactopt.coupling.mortar import Mortar, mortar
 from contactopt.coupling.mortar_surfaces import couple_surfaces
 from contactopt.coupling.reduction import Reduction
-from contactopt.meshes.structured import rename, tensor_mesh
+from contactopt.meshes.structured import tensor_mesh
 
 
 @dataclass
@@ -89,36 +89,10 @@ def resultants(forces: list[np.ndarray], points: list[np.ndarray]) -> tuple[np.n
     return sum(f.sum(axis=1) for f in forces), moment
 
 
-def slab(
-    kind: str,
-    low: float,
-    high: float,
-    cells: int,
-    start: float = 0.0,
-    end: float = 1.0,
-    power: float = 1.3,
-) -> Any:
-    """Two layers of elements between two heights and two places, `cells` of uneven width;
-    boundaries as conftest.block.
-    """
-    grids = [start + (end - start) * np.linspace(0.0, 1.0, cells + 1) ** power] * (
-        2 if kind == "solid" else 1
-    )
-    up = "z" if kind == "solid" else "y"
-    names = {f"side{i}": f"{'xy'[i]}-" for i in range(len(grids))} | {
-        "top": f"{up}+",
-        "bottom": f"{up}-",
-    }
-    return rename(tensor_mesh(*grids, np.linspace(low, high, 3)), **names)
-
-
 def ring(
     inner: float, outer: float, layers: int, sectors: int, angle: float, curved: bool = False
 ) -> Any:
-    """A ring or a part of it from angle 0 on; boundaries inner, outer, start, end.
-
-    `curved`: of isoparametric elements.
-    """
+    """A ring or a part of it from angle 0 on."""
     full = angle > 2 * np.pi - 1e-9
     mesh = tensor_mesh(np.linspace(inner, outer, layers + 1), np.linspace(0, angle, sectors + 1))
     names = {"inner": "x-", "outer": "x+", "start": "y-", "end": "y+"}
@@ -159,9 +133,7 @@ def press_fit(
     kind: str = "",
     mu=0.0,
 ):
-    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2; `kept`: the true circles are
-    known.
-    """
+    """A quarter of a ring 2 < r < 3 pressed on a ring 1 < r < 2."""
     material = Material(5.0, 0.3)
     sides = (Support("start", {"y": 0.0}), Support("end", {"x": 0.0}))
 

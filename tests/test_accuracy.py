@@ -47,9 +47,7 @@ def test_the_remainder_does_not_trust_luck():
 
 
 def test_no_functional_of_contact_is_believed_to_have_order_4():
-    """Energies of a blade in its slot on four meshes of degree 2. The last step is small by luck;
-    the limit is about 7.804.
-    """
+    """The last step of these energies is small by luck; the limit is about 7.804."""
     rest, order = mesh_error([8.198854, 8.480154, 7.820111, 7.815798], best_order("energy", 2))
     assert order is not None and order > 7
     assert 0.5 < everywhere.safety(4) * abs(rest) / (7.815798 - 7.804) < 4
@@ -57,9 +55,7 @@ def test_no_functional_of_contact_is_believed_to_have_order_4():
 
 
 def test_three_meshes_do_not_confirm_an_order_above_2():
-    """Energies of a pin in its lug on meshes of degree 2 fall with order 3 and pass the limit,
-    which is about 6.579. Two meshes show no order at all.
-    """
+    """These energies fall with order 3 and pass the limit, which is about 6.579."""
     values, best = [6.52629, 6.58031, 6.58651], best_order("energy", 2)
     rest, order = mesh_error(values, best)
     assert order is not None and order > 3
@@ -122,9 +118,7 @@ def test_the_peak_of_an_exact_ellipse_is_exact():
 
 
 def test_clapeyron():
-    """Without gap and loads but a plate's, the elastic energy is half the plate's work, which
-    friction shares.
-    """
+    """Without gap and loads but a plate's, the elastic energy is half the plate's work."""
     reduction = reduce_bodies(punch())
     solution = solve(reduction.problem, tol=1e-12)
     work = 100 * value_of("approach", reduction, solution)
@@ -153,10 +147,8 @@ def test_refinement_meets_the_target_from_coarse_to_fine():
     fine, second = refine([scene], "approach", 2e-3)
     assert first.reached and second.reached and second.error <= 2e-3
     assert fine.reduction.dofs > rough.reduction.dofs
-    assert (
-        fine.reduction.dofs == second.levels[-1].unknowns
-        and second.levels[-1].value == second.value
-    )
+    assert fine.reduction.dofs == second.levels[-1].unknowns
+    assert second.levels[-1].value == second.value
     truth = refine([scene], "approach", 5e-4)[1].extrapolated
     assert 0.5 < second.error / abs(second.value / truth - 1) < 4
     assert abs(second.extrapolated / truth - 1) < abs(second.value / truth - 1) / 2
@@ -178,11 +170,8 @@ def test_a_quantity_that_does_not_converge_is_given_up(monkeypatch):
         ROWS, "corner", ("", lambda name, rest, scene: Quantity(name, None, corner))
     )
     _, estimate = refine([punch()], "corner", 1e-3)
-    assert (
-        not estimate.reached
-        and "does not converge" in estimate.message
-        and len(estimate.levels) < 7
-    )
+    assert not estimate.reached and "does not converge" in estimate.message
+    assert len(estimate.levels) < 7
 
 
 def test_a_limit_on_unknowns(monkeypatch):
@@ -215,9 +204,8 @@ def test_given_meshes_are_halved():
 
 def test_given_meshes_of_solids_are_divided_too():
     _, estimate = refine([two_blocks("solid")], "approach", 0.1, limits=Limits(6000))
-    assert (
-        len(estimate.levels) > 1 and estimate.levels[-1].unknowns > 4 * estimate.levels[0].unknowns
-    )
+    assert len(estimate.levels) > 1
+    assert estimate.levels[-1].unknowns > 4 * estimate.levels[0].unknowns
 
 
 @pytest.mark.slow
@@ -260,18 +248,13 @@ def test_command_line(tmp_path, capsys):
     assert "NaN" not in (tmp_path / "summary.json").read_text()
 
 
-@pytest.mark.parametrize(
-    "changes,words",
-    [
-        ({"accuracy": 0.1}, "accuracy and quantity belong together"),
-        ({"quantity": "energy"}, "accuracy and quantity belong together"),
-        (
-            {"accuracy": 0.1, "quantity": "noise"},
-            "choose from pressure.*, width.*, approach, stick.*, energy",
-        ),
-        ({"accuracy": 0.0, "quantity": "energy"}, "the accuracy must be a finite number"),
-    ],
-)
+@pytest.mark.parametrize("changes,words", [
+    ({"accuracy": 0.1}, "accuracy and quantity belong together"),
+    ({"quantity": "energy"}, "accuracy and quantity belong together"),
+    ({"accuracy": 0.1, "quantity": "noise"},
+     "choose from pressure.*, width.*, approach, stick.*, energy"),
+    ({"accuracy": 0.0, "quantity": "energy"}, "the accuracy must be a finite number"),
+])  # fmt: skip
 def test_bad_input(changes, words):
     with pytest.raises(InputError, match=words):
         run("punch-2d", **changes)

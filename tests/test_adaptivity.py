@@ -1,6 +1,4 @@
-"""Local refinement: meshes stay whole, curved boundaries curved; estimates agree with errors;
-unknowns go where they are needed.
-"""
+"""Local refinement: meshes stay whole, curved boundaries curved; estimates agree with errors."""
 
 from dataclasses import replace
 
@@ -11,11 +9,10 @@ from conftest import MATERIAL
 from scipy.spatial import Delaunay
 from turned import moved, turn
 
-from contactopt import BodyForce, InputError, Part, Rigid, Scene, Support, reduce, scenes, solve
+from contactopt import BodyForce, InputError, Part, Rigid, Scene, Support, scenes
 from contactopt.accuracy import refine
 from contactopt.accuracy.indicators import element_errors
 from contactopt.accuracy.marking import divisible, left_out
-from contactopt.bodies.views import recovery_errors
 from contactopt.meshes.mesh_refinement import divide, slivers
 from contactopt.meshes.structured import simplices
 from contactopt.readings.quantities import find_quantity
@@ -75,29 +72,6 @@ def pressed_block(n):
     )
 
 
-def test_stress_errors_vanish_for_uniform_stress_and_fall_with_the_mesh():
-    body = reduce_body(pressed_block(4))
-    x, y = body.body.locations
-    linear = np.zeros(len(body.at_rest))
-    linear[body.body.unknowns] = np.array([0.1 * x + 0.2 * y, -0.3 * y])
-    assert np.abs(recovery_errors(body, linear, linear)[0]).max() < 1e-12
-    errors = []
-    for n in (8, 16, 32):
-        body = reduce_body(pressed_block(n))
-        x, y = body.body.locations
-        smooth = np.zeros(len(body.at_rest))
-        smooth[body.body.unknowns] = np.array([np.sin(x + y), x * y])
-        errors.append(recovery_errors(body, smooth, smooth)[0].sum())
-    # the square of an error of first order
-    assert errors[0] / errors[1] > 3 and errors[1] / errors[2] > 3
-
-
-def reduce_body(scene):
-    from contactopt.coupling.reduction import reduce_bodies
-
-    return reduce_bodies(scene).bodies[0]
-
-
 @pytest.mark.parametrize("quantity", ["energy", "approach"])
 def test_the_estimate_agrees_with_the_error(quantity):
     """Against the same quantity on a mesh that is four times as fine near the corner."""
@@ -113,9 +87,7 @@ def test_the_estimate_agrees_with_the_error(quantity):
 
 
 def test_unknowns_go_where_the_quantity_needs_them():
-    """For the peak pressure of Hertz the elements at the contact become small and the rest of the
-    mesh stays as it is.
-    """
+    """The elements at Hertz's contact become small, and the rest of the mesh stays as it is."""
     scene = make_scene("cylinder-2d", mu=0.0)
     solved, estimate = locally(scene, "pressure", 5e-3)
     assert estimate.reached and solved.solution.solved
@@ -134,17 +106,6 @@ def test_a_turned_scene_is_refined_the_same(angle):
         level.unknowns for level in straight.levels
     ]
     assert turned.value == pytest.approx(straight.value, rel=1e-9)
-
-
-def test_what_elements_add_is_the_whole_estimate():
-    solved = solve_scene(pressed_block(6))
-    errors = element_errors(solved, find_quantity("energy", solved.reduction.scene), 1.0)
-    marked = errors.marked(0.6)
-    sizes = np.abs(errors.bodies[0])
-    assert abs(errors.total) == pytest.approx(sizes.sum()) and len(errors.bodies[1]) == 0
-    assert sizes[marked[0]].sum() >= 0.6 * sizes.sum()
-    # with one less it would not be enough
-    assert sizes[marked[0]].sum() - sizes[marked[0]].min() < 0.6 * sizes.sum()
 
 
 def test_a_block_under_a_given_displacement_is_too_stiff_and_one_under_a_load_too_soft():
@@ -192,9 +153,7 @@ def test_the_volume_between_facets_and_their_curve_is_known():
 
 
 def test_the_estimate_holds_what_a_polygon_lacks_of_a_circle():
-    """Halved where only the contact needs it, a heavy disc keeps its long chords and weighs less:
-    the estimate says so.
-    """
+    """A heavy disc that keeps its long chords weighs less: the estimate says so."""
     scene = loaded_disc(24)
     solved = solve_scene(scene)
     quantity = find_quantity("normal_force", solved.reduction.scene)
@@ -227,23 +186,13 @@ def test_bad_input(arguments, words):
         locally(pressed_block(2), *arguments)
 
 
-def test_solutions_on_refined_meshes_are_those_of_the_same_mesh():
-    solved, _ = locally(pressed_block(4), "energy", 0.03)
-    again = solve(reduce(solved.reduction.scene))
-    assert np.allclose(
-        again.reactions, solved.solution.reactions, atol=1e-6 * again.reactions.max()
-    )
-
-
 def test_run_takes_it_and_says_what_it_did(tmp_path, capsys):
     from contactopt import run
     from contactopt.cli import main
 
     result = run("cylinder-2d", mu=0.0, accuracy=0.02, quantity="pressure", adaptive=True)
-    assert (
-        result.estimate.reached
-        and result.summary["accuracy"]["levels"][-1]["contacts"] == result.problem.contacts
-    )
+    assert result.estimate.reached
+    assert result.summary["accuracy"]["levels"][-1]["contacts"] == result.problem.contacts
     line = [
         "run",
         "punch-2d",

@@ -56,12 +56,8 @@ def half_space(pressure, shear, a, r, beta, inner=()):
     integrals.
     """
     s, w = contact_rule(a, 0, *inner, r, a)
-    p, q, m, complete = (
-        pressure(s),
-        shear(s),
-        np.minimum(4 * r * s / (r + s) ** 2, 1),
-        ellipkm1(((r - s) / (r + s)) ** 2),
-    )
+    p, q, m = pressure(s), shear(s), np.minimum(4 * r * s / (r + s) ** 2, 1)
+    complete = ellipkm1(((r - s) / (r + s)) ** 2)
     normal = w @ (p * s * 2 / np.pi * complete / (r + s)) - beta * w @ np.where(s > r, q, 0)
     ring = (r + s) / (np.pi * r * s) * ((1 - m / 2) * complete - ellipe(m))
     return normal, w @ (q * s * ring) - beta / r * w @ np.where(s < r, p * s, 0)
@@ -265,9 +261,7 @@ def test_cycle_loss_is_the_area_of_the_loop(share):
 
 
 def test_cycle_loss_of_cylinders_is_the_work_of_friction():
-    """4 int mu p s dx with the slip s of the first loading, integrated from the strains of the two
-    surfaces.
-    """
+    """4 int mu p s dx with the slip s of the first loading."""
     share = 0.7
     first = line([share])
     a, c = first.half_width, first.stick_half_width
@@ -282,10 +276,8 @@ def test_cycle_loss_of_cylinders_is_the_work_of_friction():
 
 def test_unit_systems():
     """Lengths times 1e3, forces times 7: stresses scale with force over area."""
-    one, two = (
-        hertz_point_tangential(P, R, E, GS, MU, 1.0),
-        hertz_point_tangential(7 * P, 1e3 * R, 7e-6 * E, 7e-6 * GS, MU, 7.0),
-    )
+    one = hertz_point_tangential(P, R, E, GS, MU, 1.0)
+    two = hertz_point_tangential(7 * P, 1e3 * R, 7e-6 * E, 7e-6 * GS, MU, 7.0)
     assert two.shift == pytest.approx(1e3 * one.shift)
     assert two.shear(np.array([1e3])) == pytest.approx(7e-6 * one.shear(np.array([1.0])))
 

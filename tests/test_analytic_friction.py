@@ -1,6 +1,4 @@
-"""Coulomb friction between dissimilar materials, against the half-space, limits and a contact
-algorithm.
-"""
+"""Coulomb friction between dissimilar materials, against the half-space."""
 
 import numpy as np
 import pytest
@@ -106,10 +104,7 @@ def test_punches_satisfy_the_half_space(mu, beta):
 
 @pytest.mark.parametrize("mu,beta", CASES)
 def test_round_bodies_satisfy_the_half_space(mu, beta):
-    """The surface takes the shape of the round body; the strain that a point had when it began to
-    stick stays: by
-    similarity u_x ~ x |x| there.
-    """
+    """The strain that a point had when it began to stick stays: u_x ~ x |x| there."""
     line, point = solutions(mu, beta, round_bodies=True)
     strain, stretch = [], []
     for share in (0.3, 0.6, 0.95, 1.1):
@@ -172,12 +167,7 @@ def test_singularity_of_the_edge(mu, beta):
 
 
 def contact_algorithm(mu, beta, elements=400):
-    """c/a of the plane punch by constant elements and active sets, from nothing but the law of
-    friction.
-
-    Displacements at the middle of each element from Flamant's logarithm; the edge is graded. No use
-    of Spence's theory.
-    """
+    """c/a of the plane punch by constant elements and active sets."""
     edges = np.sin(np.pi / 2 * np.linspace(0, 1, elements + 1))
     x, width = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
 

@@ -40,9 +40,7 @@ def test_newton_steps_are_added_in_one_place():
 
 
 def test_types_imported_for_annotations_have_names_of_their_own():
-    """The documentation finds such a type by its short name: two classes of one name are a warning
-    on every page that mentions either.
-    """
+    """The documentation finds such a type by its short name, which must be unique."""
     texts = [path.read_text() for path in (ROOT / "contactopt").rglob("*.py")]
     classes = [name for text in texts for name in re.findall(r"^class (\w+)", text, re.M)]
     late = {

@@ -62,9 +62,7 @@ def test_pin_becomes_hertz_and_fills_the_hole():
 
 
 def test_press_fit_is_lames_ring_integrated():
-    """Radial displacements from the differential equation r u'' + u' - u / r = 0, solved
-    numerically for both rings.
-    """
+    """From the differential equation r u'' + u' - u / r = 0, solved for both rings."""
     shaft, hub = Material(200.0, 0.3), Material(70.0, 0.2)
     exact = analytic.press_fit(0.02, 10.0, 20.0, 45.0, shaft, hub)
 
@@ -134,9 +132,7 @@ def test_press_fit_of_two_materials():
 
 
 def test_press_fit_is_the_same_all_around():
-    """Nothing tells one node from another, nor the ends at the planes of symmetry, where normals
-    lie in the plane.
-    """
+    """Nothing tells one node from another, nor the ends at the planes of symmetry."""
     scene = scenes.press_fit(interference=1e-5, elements=6)
     _, result = errors(scene)
     np.testing.assert_allclose(result.pressure, result.pressure[0], rtol=1e-5)

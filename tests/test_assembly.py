@@ -1,6 +1,4 @@
-"""Several bodies and several pairs of surfaces: statics, independence of pairs, results by surface,
-refused input.
-"""
+"""Several bodies and pairs: statics, independence of pairs, results by surface, refused input."""
 
 from dataclasses import replace
 
@@ -38,9 +36,7 @@ SOFT = Material(1000.0, 0.3)
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("cells", [(4,), (3, 4)], ids=["matching", "mortar"])
 def test_every_interface_of_a_stack_carries_what_rests_on_it(dim, form, cells):
-    """Three blocks of weight 4 (8 in 3D), pushed sideways: force and moment of every interface are
-    those of statics.
-    """
+    """Three blocks pushed sideways: force and moment of every interface are those of statics."""
     width, side = 2.0, 0.2
     scene = stack(3, dim, side=side, width=width, cells=cells)
     reduction = reduce_bodies(scene, Q=form)
@@ -68,9 +64,7 @@ def test_the_order_of_the_bodies_does_not_matter():
 
 
 def test_pairs_that_share_no_elastic_body_do_not_know_of_each_other():
-    """Two blocks side by side on one rigid floor: both as if alone, each with its own friction and
-    law.
-    """
+    """Two blocks on one rigid floor: both as if alone, each with its own friction and law."""
     loads = (Traction("top", (0.3, -1.0)),)
     parts = [
         Part(n, block([x, 0], [x + 1, 1], [4, 4]), SOFT, loads=loads, contact="bottom")
@@ -86,9 +80,8 @@ def test_pairs_that_share_no_elastic_body_do_not_know_of_each_other():
         assert np.allclose(together.reactions[pair.contacts], own.reactions, atol=1e-10)
         problem, seen = alone(both.problem, together, pair)
         assert natural_map_residual(problem, seen.reactions, seen.multipliers) < 1e-10
-        assert type(problem.law) is type(single.problem.law) and np.array_equal(
-            problem.mu, single.problem.mu
-        )
+        assert type(problem.law) is type(single.problem.law)
+        assert np.array_equal(problem.mu, single.problem.mu)
 
 
 def test_a_pair_alone_is_solved_by_its_part_of_the_solution():
@@ -138,10 +131,7 @@ def test_many_bodies_have_a_sparse_q_that_grows_with_their_number():
 
 
 def test_a_wall_is_a_network():
-    """Two blocks carry a beam; a shared floor surface is elastic.
-
-    The beam's weight is shared out by symmetry.
-    """
+    """Two blocks carry a beam, whose weight is shared out by symmetry; the floor is elastic."""
     floor = Part(
         "floor", block([0, -1], [6, 0], [12, 2]), SOFT, (Support("bottom"),), contact="top"
     )
@@ -168,9 +158,7 @@ def test_a_wall_is_a_network():
 
 
 def test_forces_on_every_body_are_in_balance():
-    """Loads, pairs, supports and plates: force and moment, with a plate, a support, a traction and
-    friction.
-    """
+    """Loads, pairs, supports and plates: force and moment."""
     lower = Part("lower", block([0, -2], [3, 0], [6, 4]), SOFT, (Support("bottom"),), contact="top")
     middle = Part(
         "middle",
@@ -192,9 +180,8 @@ def test_forces_on_every_body_are_in_balance():
     pairs, holders = pair_resultants(reduction, solution), holder_resultants(reduction, solution)
     on_lower, on_middle = pairs["middle-lower"], pairs["upper-middle.top"]
     plate, support = holders["body 'upper', plate 'top'"], holders["body 'lower', support 'bottom'"]
-    assert np.allclose(plate.force + on_middle.force, 0, atol=1e-9) and plate.force[
-        1
-    ] == pytest.approx(-2.0)
+    assert np.allclose(plate.force + on_middle.force, 0, atol=1e-9)
+    assert plate.force[1] == pytest.approx(-2.0)
     assert np.allclose(plate.moment + on_middle.moment, 0, atol=1e-9)
     assert np.allclose(on_lower.force - on_middle.force + [-0.1, 0.0], 0, atol=1e-9)
     # at half its height
@@ -252,38 +239,28 @@ def test_tables_of_one_pair_are_those_of_the_whole():
     assert pair["force"][1] == pytest.approx(100.0)
 
 
-@pytest.mark.parametrize(
-    "change,message",
-    [
-        (
-            lambda s: replace(s, contacts=(Contact("block0", "block7", 0.1),)),
-            "'block7' that is not there.*floor, block0",
-        ),
-        (lambda s: replace(s, bodies=(*s.bodies, s.bodies[1])), "two bodies are named 'block0'"),
-        (lambda s: replace(s, contacts=s.contacts[:1]), "body 'block1' belongs to no contact"),
-        (lambda s: replace(s, contacts=(*s.contacts, s.contacts[0])), "given twice"),
-        (
-            lambda s: replace(s, contacts=(*s.contacts, Contact("block0:top", "block1", 0.1))),
-            "'block1-block0.top' and 'block0.top-block1' join the same two surfaces",
-        ),
-        (
-            lambda s: replace(
-                s, contacts=(*s.contacts, Contact("block1:bottom", "block0:top", 0.0, law="tied"))
-            ),
-            "join the same two surfaces.*keep one of them",
-        ),
-        (lambda s: replace(s, contacts=()), "belong together"),
-        (lambda s: replace(s, mu=0.3), "not both"),
-        (lambda s: Contact("a", "a:top", 0.1), "'a' cannot touch itself"),
-        (lambda s: Contact("a", 3, 0.1), "by text"),
-        (lambda s: Contact("a", "b", -0.1), "must be a finite number at least 0"),
-        (lambda s: Contact("a", "b", 0.1, law="glue"), "unknown law"),
-        (lambda s: Contact("a", "b", 0.1, carrier="a"), "carrier"),
-        (lambda s: Scene("s", s.bodies[1], s.bodies[2]), "give upper, lower and mu"),
-        (lambda s: replace(s, contacts=("block0", "block1")), "must be Contact objects"),
-        (lambda s: Part("a/b", unit_block("plane-strain", 0, 1), SOFT), "cannot name a file"),
-    ],
-)
+@pytest.mark.parametrize("change,message", [
+    (lambda s: replace(s, contacts=(Contact("block0", "block7", 0.1),)),
+     "'block7' that is not there.*floor, block0"),
+    (lambda s: replace(s, bodies=(*s.bodies, s.bodies[1])), "two bodies are named 'block0'"),
+    (lambda s: replace(s, contacts=s.contacts[:1]), "body 'block1' belongs to no contact"),
+    (lambda s: replace(s, contacts=(*s.contacts, s.contacts[0])), "given twice"),
+    (lambda s: replace(s, contacts=(*s.contacts, Contact("block0:top", "block1", 0.1))),
+     "'block1-block0.top' and 'block0.top-block1' join the same two surfaces"),
+    (lambda s: replace(s,
+     contacts=(*s.contacts, Contact("block1:bottom", "block0:top", 0.0, law="tied"))),
+     "join the same two surfaces.*keep one of them"),
+    (lambda s: replace(s, contacts=()), "belong together"),
+    (lambda s: replace(s, mu=0.3), "not both"),
+    (lambda s: Contact("a", "a:top", 0.1), "'a' cannot touch itself"),
+    (lambda s: Contact("a", 3, 0.1), "by text"),
+    (lambda s: Contact("a", "b", -0.1), "must be a finite number at least 0"),
+    (lambda s: Contact("a", "b", 0.1, law="glue"), "unknown law"),
+    (lambda s: Contact("a", "b", 0.1, carrier="a"), "carrier"),
+    (lambda s: Scene("s", s.bodies[1], s.bodies[2]), "give upper, lower and mu"),
+    (lambda s: replace(s, contacts=("block0", "block1")), "must be Contact objects"),
+    (lambda s: Part("a/b", unit_block("plane-strain", 0, 1), SOFT), "cannot name a file"),
+])  # fmt: skip
 def test_wrong_input_is_refused(change, message):
     with pytest.raises(InputError, match=message):
         change(stack(2))

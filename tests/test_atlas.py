@@ -1,6 +1,4 @@
-"""The atlas of failure: every problem in it still defeats its method, each proof holds, and
-thresholds are predicted on problems that nobody has seen.
-"""
+"""Every problem of the atlas still defeats its method, and thresholds are predicted."""
 
 from dataclasses import replace
 
@@ -16,23 +14,8 @@ from experiments.questions.atlas.__main__ import WORDS, failures, report
 from experiments.questions.atlas.frontiers import MULTIPLIERS, crawl_ratio, nearly
 from experiments.questions.atlas.problems import FAILED, Case, run
 from experiments.questions.atlas.problems import draw as drawn
-from experiments.questions.atlas.radii import (
-    AROUND,
-    fails,
-    fresh,
-    newton_load,
-    pair,
-    penalty_error,
-)
-from experiments.questions.atlas.search import (
-    CURES,
-    KNOWN,
-    continued,
-    definite,
-    rounded,
-    search,
-    smaller,
-)
+from experiments.questions.atlas.radii import AROUND, fails, fresh, newton_load, pair, penalty_error
+from experiments.questions.atlas.search import CURES, KNOWN, definite, rounded, search, smaller
 
 OURS = {row["method"]: row for row in failures() if " " not in row["method"]}
 FAILING = [name for name, row in OURS.items() if "case" in row]
@@ -112,25 +95,6 @@ def test_the_search_finds_and_shrinks():
     assert sum(found["failed"].values()) > 0 and len(found["case"]["q"]) <= 2
     again = smaller("nsgs", KNOWN["nsgs"])
     assert len(again.q) == 2 and run("nsgs", again).residual > FAILED
-
-
-def test_a_search_goes_on_after_its_last_seed_and_keeps_the_smallest_problem(monkeypatch):
-    small, large = KNOWN["newton"].numbers, KNOWN["nsgs"].numbers
-    monkeypatch.setattr(
-        searching,
-        "search",
-        lambda name, seed, seconds: {
-            "tried": {"none": 2, f"{seed} contacts": 2},
-            "failed": {"none": seed},
-            "case": small if seed == 1 else large,
-        },
-    )
-    row = next(continued("newton", {}))
-    assert row["seeds"] == 1 and row["case"] == large
-    twice = continued("newton", row)
-    assert [next(twice)["seeds"], next(twice)["seeds"]] == [2, 3]
-    assert row["tried"] == {"none": 6, "0 contacts": 2, "1 contacts": 2, "2 contacts": 2}
-    assert row["failed"] == {"none": 3} and row["case"] == small
 
 
 def test_shorter_numbers_do_not_make_a_singular_compliance_indefinite(monkeypatch):

@@ -2,11 +2,9 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import BackendError, InputError, InterfaceProblem, natural_map_residual, solve
+from contactopt import BackendError, InputError, natural_map_residual, solve
 from contactopt.methods.backends import CONIC, QP, Backend, find
 from contactopt.methods.backends.conic import Conic
-from contactopt.methods.backends.qp import BoxQP
-from contactopt.models import tangential
 
 # those that come with the package; the others have an extra, and are tested where they are there
 REQUIRED_QP = ("clarabel", "osqp", "proxqp")
@@ -77,18 +75,13 @@ def test_a_backend_that_fails_is_a_status_that_names_it(monkeypatch, punch, answ
 
 
 def test_a_backend_that_lies_is_asked_again_and_then_reported(monkeypatch, punch):
-    """Whatever it claims, what comes back is checked against the problem: here a vector that no
-    crossover can save.
-    """
+    """What comes back is checked against the problem: here a vector that no crossover can save."""
     asked = []
     fake(monkeypatch, lambda p: asked.append(p) or np.full(len(p.q), 5.0))
     monkeypatch.setattr("contactopt.methods.kernels.semismooth.STEPS", 1)
     solution = solve(punch, "alternating", max_iterations=3)
-    assert (
-        solution.status.label == "backend_failed"
-        and "proxqp" in solution.message
-        and "twice" in solution.message
-    )
+    assert solution.status.label == "backend_failed" and "proxqp" in solution.message
+    assert "twice" in solution.message
     assert len(asked) == 2
     assert (
         solution.residual
@@ -110,23 +103,6 @@ def test_tighter_settings_are_tighter():
                 np.all(np.ravel(numbers(tight[key])) <= numbers(loose[key])) for key in loose
             )
             assert tight != loose or backend.name == "quadprog"
-
-
-def test_box_qp_multiplier_sign():
-    """min x^2/2 - x subject to x = 2: P x + c + A'y = 0 gives y = -1."""
-    x, y = BoxQP.using("proxqp", np.eye(1), np.eye(1)).solve(
-        -np.ones(1), np.array([2.0]), np.zeros(1), np.full(1, np.inf)
-    )
-    assert x[0] == pytest.approx(2) and y[0] == pytest.approx(-1)
-
-
-def test_socp_is_built_once_and_solved_for_new_parameters():
-    program = tangential(InterfaceProblem(np.eye(3), [[0.0, -3.0, -4.0]], 0.5))
-    socp = Conic.using("clarabel", program, np.eye(2))
-    for radius in (1.0, 3.0):
-        t = socp.solve(r_n=np.ones(1), g=np.array([radius]))["r_t"]
-        assert np.allclose(t, radius * np.array([0.6, 0.8]), atol=1e-6)
-    assert program.problem.is_dcp(dpp=True)
 
 
 def test_indefinite_tangential_compliance_is_refused():

@@ -64,20 +64,15 @@ def test_every_run_is_a_row_with_every_column(campaign):
     assert list(table.columns[: len(COLUMNS)]) == list(COLUMNS)
     assert set(table["status"]) == {"solved"} and table["success"].all()
     assert (table["residual"] <= 1e-8).all() and (table["error"] <= 1e-6).all()
-    assert (
-        table.groupby("problem")["fingerprint"].nunique().eq(1).all()
-        and table["fingerprint"].nunique() == 3
-    )
+    assert table.groupby("problem")["fingerprint"].nunique().eq(1).all()
+    assert table["fingerprint"].nunique() == 3
     assert set(table["problem.mu"].dropna()) == {0.2, 0.5}
-    assert (table["build_seconds"] > 0).all() and (
-        table["solve_seconds"] <= table["call_seconds"]
-    ).all()
+    assert (table["build_seconds"] > 0).all()
+    assert (table["solve_seconds"] <= table["call_seconds"]).all()
     assert (table["peak_mb"] >= table["base_mb"]).all() and (table["base_mb"] > 10).all()
     residuals, seconds, iterations = json.loads(table["history"].iloc[0])
-    assert (
-        len(residuals) == len(seconds) == len(iterations)
-        and iterations[-1] == table["iterations"].iloc[0]
-    )
+    assert len(residuals) == len(seconds) == len(iterations)
+    assert iterations[-1] == table["iterations"].iloc[0]
 
 
 def test_tables_survive_parquet_and_csv(campaign, tmp_path):
@@ -137,10 +132,8 @@ def test_an_interrupted_campaign_keeps_its_rows(tmp_path):
     while process.poll() is None and count(out) < 5:
         time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    assert (
-        "--resume" in process.communicate(timeout=PATIENCE)[1].splitlines()[-1]
-        and process.returncode == 130
-    )
+    assert "--resume" in process.communicate(timeout=PATIENCE)[1].splitlines()[-1]
+    assert process.returncode == 130
     with Store(out, resume=True) as store:
         assert len(store.finished()) >= 5
 

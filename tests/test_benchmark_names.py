@@ -67,9 +67,7 @@ STRANGE = ["<b>bold", "x | y", "$\\frac{$ and $a$", "[a](", "`", "a\nb"]
 
 @pytest.mark.slow
 def test_strange_texts_are_shown_as_they_are(tmp_path):
-    """The same texts as title, text, captions, finding and names of solvers and problems, in tables
-    and figures.
-    """
+    """The same texts as title, text, captions, finding and names of solvers and problems."""
     rows = [json.loads(line) for line in _rows(tmp_path)]
     for number, row in enumerate(rows):
         name = STRANGE[number % len(STRANGE)]

@@ -88,11 +88,8 @@ def test_killed_processes_cost_their_own_run_only(tmp_path):
     least = {r.key for r in expected if not slow.repeated(r)}
     assert len(keys) == len(set(keys)) and least <= set(keys) <= {r.key for r in expected}
     failed = [row for row in rows if not row["success"]]
-    assert (
-        len(failed) <= killed
-        and {row["status"] for row in failed} <= {"out_of_memory"}
-        and killed >= 2
-    )
+    assert len(failed) <= killed and {row["status"] for row in failed} <= {"out_of_memory"}
+    assert killed >= 2
 
 
 GROWN = []
@@ -107,9 +104,7 @@ def grow(size: int) -> int:
 
 @pytest.mark.slow
 def test_a_process_that_grows_goes_on():
-    """The library of processes would recycle one that grew by 300 MB in more than a second, and a
-    call at that moment was told as a crash, or waited for ever.
-    """
+    """A library would recycle a process that grew by 300 MB, and told a call then as a crash."""
     grown = process.Process()
     try:
         numbers = {grown.ask(60, "grow", grow, 150 * 10**6) for _ in range(6)}
@@ -154,9 +149,7 @@ def deadly_pipes():
 
 @pytest.mark.slow
 def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch, deadly_pipes):
-    """A builder that dies between two problems costs no run, and one that is killed once while it
-    builds costs none either.
-    """
+    """A builder that dies between two problems, or once while it builds, costs no run."""
     with pool.Worker() as worker:
         first = worker.builder.ask(60.0, "look", os.getpid)
         os.kill(first, signal.SIGKILL)
@@ -178,9 +171,7 @@ def test_a_process_killed_while_nobody_asks_it_is_started_again(monkeypatch, dea
 @pytest.mark.slow
 @pytest.mark.parametrize("kills", [2, 3])
 def test_a_solver_killed_while_it_starts_is_started_again(monkeypatch, kills):
-    """Twice may be chance; a process that never lives to say a word ends the campaign with one
-    sentence.
-    """
+    """Twice may be chance; a process that never says a word ends the campaign with a sentence."""
     starts = []
 
     deadly, whole = "import os; os.kill(os.getpid(), 9)  # {} {}", process.PROGRAM
@@ -219,9 +210,7 @@ def solvers(campaign: int) -> list[int]:
 
 @pytest.mark.slow
 def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
-    """Nothing is left in the module: not by a second registry, and not by a file that is imported
-    in a plain way.
-    """
+    """Nothing is left in the module by a second registry, or by a plain import."""
     from contactopt.benchmark.plugins import Registry
 
     file = tmp_path / "mine.py"
@@ -236,9 +225,8 @@ def test_a_plug_in_counts_for_the_registry_that_runs_its_file(tmp_path):
     assert "own" not in second.methods and not second.problems
     names = {}
     exec(compile(file.read_text(), file, "exec"), names)
-    assert (
-        callable(names["mine"]) and "own" not in second.methods and list(first.methods) == ["own"]
-    )
+    assert callable(names["mine"]) and "own" not in second.methods
+    assert list(first.methods) == ["own"]
 
 
 def test_writing_to_a_dead_process_is_an_error_whatever_a_library_did_to_the_signal(deadly_pipes):

@@ -27,15 +27,11 @@ REPORTS = Path(__file__).parents[1] / "reports"
 def table(**columns) -> pd.DataFrame:
     """Rows with the given columns; the others as in a successful run."""
     size = max(len(v) for v in columns.values())
-    usual = {"setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True}
-    usual |= {
-        "claimed": True,
-        "status": "solved",
-        "residual": 1e-7,
-        "time_limit": 10.0,
-        "problem": "p",
-        "method": "m",
-    }
+    usual = {
+        "setting": "mid", "tolerance": 1e-6, "start": "cold", "repeat": 0, "success": True,
+        "claimed": True, "status": "solved", "residual": 1e-7, "time_limit": 10.0,
+        "problem": "p", "method": "m",
+    }  # fmt: skip
     return pd.DataFrame({name: [value] * size for name, value in usual.items()} | columns)
 
 
@@ -195,11 +191,8 @@ def test_a_report_is_rebuilt_without_solving(reported, monkeypatch):
     assert again == text and "1. 12 runs were made." in text and "What it is." in text
     for name in re.findall(r"!\[.*?\]\((.*?)\)", text):
         assert Path("reports/small", name).stat().st_size > 1000
-    assert (
-        text.count("*Figure ") == 2
-        and text.count("*Table ") == 1
-        and "contactopt report --run full small" in text
-    )
+    assert text.count("*Figure ") == 2 and text.count("*Table ") == 1
+    assert "contactopt report --run full small" in text
     quick = Path("out/quick/reports/small/report.md").read_text()
     assert "1. 6 runs were made." in quick
     csv = benchmark.load("reports/small/rows.csv")
@@ -233,10 +226,7 @@ def test_errors_of_a_report_name_the_figure(reported, monkeypatch, capsys, old, 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(CAMPAIGNS.glob("*.toml")), ids=lambda p: p.stem)
 def test_committed_reports_follow_from_their_tables(path, tmp_path, monkeypatch):
-    """Every experiment can be read in both versions, and its report says what its table says.
-
-    Pictures are left out.
-    """
+    """Every experiment can be read in both versions, and its report says what its table says."""
     monkeypatch.setattr(benchmark.report, "_png", lambda figure: b"")
     for quick in (False, True):
         assert benchmark.read_experiment(path, quick=quick).runs()

@@ -12,9 +12,7 @@ from contactopt import Contact, Material, Part, Pressure, Scene, Support, run
 
 
 def blocks(*each, laws=("tied",), degree=1):
-    """Blocks (low, high, cells, kind) that fill a box, on rollers and under a pressure of one; the
-    pairs that touch have the laws in turn.
-    """
+    """Blocks (low, high, cells, kind) that fill a box, on rollers and under a pressure of one."""
     low = np.min([one[0] for one in each], axis=0)
     high = np.max([one[1] for one in each], axis=0)
     axes, parts, contacts = "xyz"[: len(low)], [], []

@@ -68,31 +68,20 @@ def test_normals_of_a_closed_surface_sum_to_zero():
     assert np.all(np.sum(body.trace.normals * body.points, axis=0) > 0)
 
 
-@pytest.mark.parametrize(
-    "kind,supports,motions",
-    [
-        (
-            "plane-strain",
-            (),
-            ["translation along x", "translation along y", "rotation in the x-y plane"],
-        ),
-        ("plane-strain", ("side0",), ["translation along y"]),
-        ("plane-strain", ({"top": "y"},), ["translation along x"]),
-        ("plane-strain", ({"bottom": "xy"},), []),
-        ("solid", ("side0", "side1"), ["translation along z"]),
-        (
-            "solid",
-            ({"top": "z"},),
-            ["translation along x", "translation along y", "rotation in the x-y plane"],
-        ),
-        ("axisymmetric", ("side0",), ["translation along z"]),
-        ("axisymmetric", (), ["translation along z"]),
-    ],
-)
+@pytest.mark.parametrize("kind,supports,motions", [
+    ("plane-strain", (),
+     ["translation along x", "translation along y", "rotation in the x-y plane"]),
+    ("plane-strain", ("side0",), ["translation along y"]),
+    ("plane-strain", ({"top": "y"},), ["translation along x"]),
+    ("plane-strain", ({"bottom": "xy"},), []),
+    ("solid", ("side0", "side1"), ["translation along z"]),
+    ("solid", ({"top": "z"},),
+     ["translation along x", "translation along y", "rotation in the x-y plane"]),
+    ("axisymmetric", ("side0",), ["translation along z"]),
+    ("axisymmetric", (), ["translation along z"]),
+])  # fmt: skip
 def test_motions_that_nothing_holds_are_found(kind, supports, motions):
-    """They leave held unknowns at rest, strain nothing, and the fixing unknowns make the stiffness
-    definite.
-    """
+    """They strain nothing, and the fixing unknowns make the stiffness definite."""
     components = {"plane-strain": "xy", "axisymmetric": "rz", "solid": "xyz"}[kind]
     chosen = []
     for s in supports:
@@ -145,9 +134,7 @@ def test_a_mesh_in_two_pieces_is_refused():
 
 @pytest.mark.parametrize("mesh", [skfem.MeshTri, skfem.MeshTet])
 def test_an_element_that_lies_over_its_neighbour_is_refused(mesh):
-    """A node within the mesh is moved past the elements around it, whose volumes stay positive once
-    they are numbered the right way round.
-    """
+    """A node is moved past the elements around it, whose volumes stay positive once renumbered."""
     mesh, top = mesh().refined(2), {"top": lambda x: x[-1] == 1, "bottom": lambda x: x[-1] == 0}
     kind = "plane-strain" if len(mesh.p) == 2 else "solid"
     places = mesh.p.copy()

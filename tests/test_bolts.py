@@ -88,8 +88,7 @@ def test_stiff_bolts_whose_faces_share_nodes_are_named():
                    (MeshQuad, "axisymmetric")],
 )  # fmt: skip
 def test_contact_carries_the_force_of_the_bolt(mesh, kind, tilting):
-    """The upper block is held by nothing else. By hand, the faces have traction F / area, or they
-    are plates that move freely; an axisymmetric one keeps its radius."""
+    """By hand, the faces have traction F / area, or they are plates that move freely."""
     bolted = clamp(mesh, bolts=(Bolt(FACES, F, "m4", tilting),), kind=kind)
     area = {"solid": 1.0, "plane-strain": 1.0, "axisymmetric": np.pi * (1.5**2 - 0.5**2)}[kind]
     axes = bolted.components

@@ -24,13 +24,7 @@ from contactopt.bounds.vertex_balance import Balance
 from contactopt.meshes.cells import measures
 from contactopt.solving.solve_scene import solve_scene
 from experiments.questions.bounds import compatible, composite
-from tests.test_bounds import (
-    MATERIAL,
-    block,
-    cubes,
-    narrower,
-    two_blocks,
-)
+from tests.test_bounds import MATERIAL, block, cubes, narrower, two_blocks
 
 
 def clamped(mesh):
@@ -126,9 +120,7 @@ def test_the_nearest_stress_does_not_depend_on_the_numbering():
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("inner", [0.0, 0.5, 50.0, None])
 def test_a_stress_of_a_section_does_the_work_of_the_loads(degree, inner):
-    """For every displacement of a ring, or in plane strain, from any stress: it is in equilibrium
-    everywhere.
-    """
+    """For every displacement, from any stress: it is in equilibrium everywhere."""
     random, mesh, revolved = np.random.default_rng(1), block(4), inner is not None
     mesh = replace(mesh, doflocs=mesh.p + np.array([[inner or 0.0], [0.0]]))
     cells = EquilibriumElements(mesh, degree, revolved)
@@ -163,9 +155,7 @@ def test_a_stress_of_a_section_does_the_work_of_the_loads(degree, inner):
 
 
 def test_the_stress_of_a_bilinear_displacement():
-    """On any quadrilaterals: the slopes at a point are those between points near it, and on
-    parallelograms the displacement is quadratic.
-    """
+    """Slopes are those between points near it; on parallelograms the displacement is quadratic."""
     random = np.random.default_rng(0)
     square = skfem.MeshQuad().refined(2)
     sheared = replace(square, doflocs=np.array([[1.0, 0.3], [-0.2, 0.8]]) @ square.p)
@@ -202,9 +192,7 @@ def test_the_constant_of_uneven_tractions_is_proved():
 @pytest.mark.parametrize("shape", ["regular", "tall", "flat", "any"])
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
 def test_no_uneven_traction_needs_more_energy_than_its_bound(shape, nu):
-    """The worst of all tractions for a displacement of fine elements, in simplices of any shape;
-    the bound is that of a turned simplex in other units as well.
-    """
+    """The worst of all tractions on simplices of any shape, turned, and in other units."""
     random, dim = np.random.default_rng(3), 3
     height = {"tall": 4.0, "flat": 0.25}.get(shape, 1.0)
     points = np.diag([1.0] * (dim - 1) + [height]) @ regular_tetrahedron().mesh.p

@@ -99,9 +99,7 @@ def test_what_is_nothing_beside_the_size_is_printed_as_0(tmp_path, monkeypatch, 
 
 
 def test_the_printed_beginning_of_a_scene_is_solved_as_our_own_mesh_is(parts, capsys):
-    """The cube without its bore on the plate: tetrahedra of Gmsh and our bricks give the same
-    force, and nearly the same approach.
-    """
+    """Tetrahedra of Gmsh and our bricks give the same force, and nearly the same approach."""
     draw(bored=False)
     asked = ["mesh", str(parts), "--size", "0.8", "--name", "back=body1:y-", "--no-open", "-q"]
     assert main(asked) == 0
@@ -153,9 +151,7 @@ def test_what_is_not_there_is_told(parts, options, words, capsys):
 
 
 def test_new_names_take_a_size_and_shapes_are_told(parts, capsys):
-    """The edges on the bore are as fine as asked for by its new name; a flat boundary has its
-    outward normal, a round one its radius.
-    """
+    """Edges on the bore are as fine as asked for by its new name; boundaries tell their shapes."""
     asked = ["--name", "bore=cylinder1", "--fine", "bore:0.25", "--size", "0.8", "--no-page", "-q"]
     assert main(["mesh", str(parts), *asked]) == 0
     told = capsys.readouterr().out

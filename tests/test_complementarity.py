@@ -114,9 +114,7 @@ def test_agrees_with_newton_on_the_punch(elements, mu):
 
 
 def test_two_plate_motions():
-    """A second plate column, tangential: the plate is dragged by a third of the limit, and one
-    contact has no friction.
-    """
+    """A second plate column: the plate is dragged, and one contact has no friction."""
     k = 4
     A = np.random.default_rng(3).normal(size=(2 * k, 4 * k))
     V = np.zeros((2 * k, 2))
@@ -171,9 +169,7 @@ def redundant(seed: int, dim: int, most: int) -> InterfaceProblem:
 
 @pytest.mark.parametrize(("dim", "count", "most"), [(2, 40, 12), (3, 15, 6)])
 def test_redundant_contacts_are_solved_or_proved_to_have_no_solution(dim, count, most):
-    """The proof is compared with Lemke's method in the plane, and with Gauss-Seidel sweeps in
-    space, which must not find a solution then.
-    """
+    """The proof is compared with Lemke's method in the plane, and with Gauss-Seidel in space."""
     ends = []
     for seed in range(count):
         problem = redundant(seed, dim, most)

@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 from conftest import one_contact
 
-from contactopt import (
-    InputError,
-    InterfaceProblem,
-    natural_map_residual,
-    solve,
-)
+from contactopt import InputError, InterfaceProblem, natural_map_residual, solve
 from contactopt.errors import BackendError
 from contactopt.methods.backends.direct import CoulombSOCP
 from contactopt.methods.cone import AcaryCadoux, Relaxation, cone_program
@@ -58,9 +53,7 @@ def test_direct_bridge_keeps_nothing_of_the_last_linear_term(dim):
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_relaxation_solves_associated_friction(dim):
-    """r = proj(r - u) on the cones: pressed contacts that slip open by mu |u_t|, which is not
-    Coulomb's law.
-    """
+    """Pressed contacts slip open by mu |u_t|, which is not Coulomb's law."""
     problem = mixed(dim)
     solution = solve(problem, Relaxation())
     assert solution.iterations == 1 and solution.status.label == "settled"

@@ -1,6 +1,4 @@
-"""What CONTRIBUTING.md says of the project is so; its page of plug-ins is run by
-tests/test_plugins.py.
-"""
+"""What CONTRIBUTING.md says is so; tests/test_plugins.py runs its page of plug-ins."""
 
 import re
 import subprocess

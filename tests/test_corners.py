@@ -164,9 +164,7 @@ def test_contacts_at_one_place_bear_alike_also_those_that_bore_nothing(share):
 @pytest.mark.parametrize("law", ["coulomb", "bilateral"])
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.2])
 def test_the_least_friction_obeys_the_law(law, share):
-    """A node in a corner, pulled off one face by .1: the friction of the other one, which bears 1,
-    must hold it if no contact may pull. Its forces bear any `share` more on both.
-    """
+    """A node in a corner, pulled off one face: the friction of the other one must hold it."""
     felt = np.array([[1.0, 0, 0, 1], [0, 1, 1, 0]])  # what moves the node along x and y
     chart = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3).chart
     pairs, at = (Pair("a", 0, 1, chart), Pair("b", 1, 2, chart)), np.zeros((2, 2))

@@ -1,6 +1,4 @@
-"""Newton's method on contact forces and displacements at once: the same answers, for the price of a
-few solves.
-"""
+"""Newton's method on forces and displacements at once gives the same answers."""
 
 from dataclasses import replace
 from functools import partial
@@ -72,9 +70,7 @@ def test_it_solves_every_law(law):
 
 @pytest.mark.parametrize("scene, elements", [(scenes.flat_punch(3), 4), (make_scene("stack"), 4)])
 def test_displacements_come_with_the_forces(scene, elements, monkeypatch):
-    """Plates, supports and bodies that float: what the method carried along is what solves with the
-    bodies give.
-    """
+    """For plates, supports and bodies that float, as solves with the bodies give them."""
     reduction = reduce_bodies(scene, elements, solver="multigrid")
     solution = solve(reduction.problem, "newton", tol=1e-9)
     assert solution.solved
@@ -221,12 +217,8 @@ def test_long_solves_say_what_they_reached(monkeypatch):
     )
     steps = [line for line in said if line.startswith("step")]
     assert len(steps) == solved.solution.iterations
-    assert (
-        "V-cycles" in steps[0]
-        and "GiB" in steps[0]
-        and "s left" in steps[1]
-        and "s left" not in steps[-1]
-    )
+    assert "V-cycles" in steps[0] and "GiB" in steps[0] and "s left" in steps[1]
+    assert "s left" not in steps[-1]
 
 
 def test_time_left_goes_on_as_the_last_step():

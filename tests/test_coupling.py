@@ -1,6 +1,4 @@
-"""The coupling of bodies: which contacts are partners, the charts of contact surfaces, and what
-others can add.
-"""
+"""The coupling of bodies: which contacts are partners, the charts of contact surfaces."""
 
 import threading
 from dataclasses import dataclass, replace
@@ -73,9 +71,7 @@ def test_the_numbering_of_the_meshes_does_not_matter(make):
 
 
 def test_a_path_makes_its_maps_once(monkeypatch):
-    """One map for each body, however many states the path has: reduction, recovery and energies use
-    the same.
-    """
+    """One map for each body, however many states the path has."""
     made = []
     counted = lambda *arguments: made.append(1) or coupling.local_map(*arguments)  # noqa: E731
     monkeypatch.setattr(matching, "local_map", counted)
@@ -86,9 +82,7 @@ def test_a_path_makes_its_maps_once(monkeypatch):
 
 
 def sector(scene, degrees):
-    """A pin in a bush cut to a sector of the bush about the lowest point, where the mean normal
-    still has a meaning.
-    """
+    """A pin in a bush cut to a sector of the bush about the lowest point."""
     reach = np.cos(np.deg2rad(degrees / 2))
 
     def cut(part, radius):
@@ -117,9 +111,7 @@ def test_a_sector_of_a_bush_matches_along_the_radius(degrees):
 
 
 def test_two_curved_bodies_may_match_along_the_mean_normal():
-    """Nodes at the same x on a hill and a valley with a clear gap: partners across, not along the
-    slope's normal.
-    """
+    """Nodes at the same x on a hill and a valley: partners across, not along the slope's normal."""
     x = np.linspace(-1.0, 1.0, 9)
 
     def body(low, high, curve):
@@ -130,9 +122,8 @@ def test_two_curved_bodies_may_match_along_the_mean_normal():
     lower = Part("lower", body(-1.0, 0.0, 0.2), MATERIAL, (Support("bottom"),), (), "top")
     reduction = reduce_bodies(Scene("hill", upper, lower, 0.3))
     n, at = reduction.coupling.frames[:, 0], reduction.coupling.positions[0]
-    assert np.allclose(at, x) and np.allclose(
-        reduction.coupling.gap, 0.4 * x**2 * n[:, 1], atol=1e-12
-    )
+    assert np.allclose(at, x)
+    assert np.allclose(reduction.coupling.gap, 0.4 * x**2 * n[:, 1], atol=1e-12)
 
 
 def test_partners_half_a_sector_off_are_refused():
@@ -146,9 +137,7 @@ def test_partners_half_a_sector_off_are_refused():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_half_and_quarter_models_are_mirrored_at_their_planes(dim):
-    """The charts of named scenes are their coordinates, whichever side of the plane the model lies
-    on.
-    """
+    """The charts of named scenes are their coordinates, on either side of the plane."""
     scene = scenes.flat_punch(dim, elements=3)
     problem = reduce(scene)
     assert problem.chart.mirrored == (True,) * (dim - 1)
@@ -185,9 +174,7 @@ def test_a_clamped_end_is_no_plane_of_symmetry():
 
 
 def test_an_arc_is_measured_along_itself():
-    """A rigid punch on a quarter of a ring: the chart is radius times angle, to the accuracy of
-    chords.
-    """
+    """A rigid punch on a quarter of a ring: the chart is radius times angle."""
     sectors = 64
     mesh = turned.ring(1.0, 2.0, 2, sectors)
     facets = mesh.boundaries["outside"]
@@ -218,6 +205,8 @@ def test_friction_may_be_a_function_of_the_place():
     ):
         with pytest.raises(InputError, match="friction"):
             reduce(replace(scene, mu=wrong))
+    with pytest.raises(InputError, match="one number or one per contact"):
+        reduce(replace(scene, mu=[0.1, 0.2]))
 
 
 @dataclass(frozen=True)
@@ -251,9 +240,7 @@ def assemble_sprung(scene, part, elements, zone):
 
 @pytest.mark.parametrize("form", ["explicit", "implicit"])
 def test_a_kind_of_body_is_added_by_one_line(monkeypatch, form):
-    """A block on a sprung floor: the springs add to the approach, and to the energy, what the force
-    asks of them.
-    """
+    """The springs add to the approach and to the energy what the force asks of them."""
     monkeypatch.setitem(BODIES, Sprung, (__name__, "assemble_sprung", "a rigid body on springs"))
     scene = replace(two_blocks("plane-strain", force=3.0), lower=Sprung("floor", k=2.0))
     reduction = reduce_bodies(scene, Q=form)
@@ -328,9 +315,7 @@ def test_a_surface_is_asked_for_by_its_name():
 
 
 def test_a_pin_in_a_bush_in_space():
-    """Extruded rings in any position: gaps along the radius, frames that are orthonormal and
-    right-handed.
-    """
+    """Gaps along the radius, and frames that are orthonormal and right-handed."""
     from contactopt.meshes.discs import extrude
 
     def body(inner, outer, contact, support, R):

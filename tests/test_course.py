@@ -1,6 +1,4 @@
-"""The chapters run; every exercise passes its right answer, which is found in two ways, and tells
-what is wrong with typical mistakes.
-"""
+"""The chapters run; every exercise passes its right answer, which is found in two ways."""
 
 import json
 import os
@@ -20,14 +18,7 @@ import pytest
 from contactopt import InterfaceProblem, laws, solve
 from contactopt.teaching import Slider
 from experiments.course import grader
-from experiments.course.feedback import (
-    Displacements,
-    Forces,
-    Numbers,
-    Open,
-    State,
-    judge_forces,
-)
+from experiments.course.feedback import Displacements, Forces, Numbers, Open, State, judge_forces
 from experiments.course.grader import check, exercise, exercises, grade, hint, right_answer, table
 
 ROOT = Path(__file__).parents[1]
@@ -236,9 +227,7 @@ def test_rounding_to_three_digits_and_arrays_of_one_number_are_right():
 
 # two nodes in space; each case spoils one condition at the second node
 PRESSED = InterfaceProblem(
-    np.diag([1.0, 1.0, 1.0, 1.0, 2.0, 2.0]),
-    [[-1.0, 0.2, 0.0], [-1.0, 3.0, 4.0]],
-    0.5,
+    np.diag([1.0, 1.0, 1.0, 1.0, 2.0, 2.0]), [[-1.0, 0.2, 0.0], [-1.0, 3.0, 4.0]], 0.5
 )
 
 

@@ -188,9 +188,7 @@ def test_eight_bodies_at_a_point_bear_a_uniform_stress(cells, degree, laws):
 
 @pytest.mark.parametrize("dim, cells", [(2, (4,) * 4), (2, (4, 5, 6, 3)), (3, (2,) * 8)])
 def test_of_forces_that_a_corner_can_exchange_those_with_the_least_friction_are_given(dim, cells):
-    """What contacts exchange is the kernel of their columns of Q: any small share is a solution,
-    too. Without friction, and where ties take part, the forces are unique.
-    """
+    """Any small share of the kernel is a solution, too; without friction the forces are unique."""
     scene, _ = quarters(cells, ("coulomb",) * dim, dim)
     problem = reduce_bodies(scene).problem
     solution = solve(problem)

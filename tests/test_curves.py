@@ -120,10 +120,8 @@ def test_halved_meshes_converge_to_the_ring(kind):
         errors.append(abs(volume(mesh) / exact - 1))
         mesh = split(mesh, curves)
     order = 4 if kind == "second order" else 2
-    assert (
-        np.log2(errors[0] / errors[1]) > order - 0.1
-        and np.log2(errors[1] / errors[2]) > order - 0.1
-    )
+    assert np.log2(errors[0] / errors[1]) > order - 0.1
+    assert np.log2(errors[1] / errors[2]) > order - 0.1
     assert curves["inner"].known == (kind == "second order")
     nodes = np.unique(mesh.facets[:, mesh.boundaries["inner"]])
     assert np.abs(np.hypot(*mesh.p[:, nodes]) - 1).max() < 1e-13
@@ -160,9 +158,8 @@ def test_solids_converge_to_the_cylinder_with_flat_ends(kind):
     inner, end = (np.unique(fine.facets[:, fine.boundaries[name]]) for name in ("inner", "end"))
     assert np.abs(np.hypot(x, y)[inner] - 1).max() < 1e-12 and np.abs(z[end]).max() < 1e-13
     curved = bent(mesh, curves)
-    assert abs(volume(curved) / exact - 1) < 2e-3 and np.all(
-        np.ptp(np.sign(volumes(curved)), axis=1) == 0
-    )
+    assert abs(volume(curved) / exact - 1) < 2e-3
+    assert np.all(np.ptp(np.sign(volumes(curved)), axis=1) == 0)
     assert boundary_curves(curved)["inner"].known and boundary_curves(curved)["end"] is None
 
 
@@ -216,9 +213,8 @@ def test_scenes_are_halved_with_the_curves_that_they_give():
     given = roller(lambda x: 20 * x / np.hypot(*x))
     fine = split_scene(given, 8, 2)
     mesh = fine.upper.build_mesh(8, None)
-    assert mesh.nelements == 16 * given.upper.mesh.nelements and type(mesh) is type(
-        given.upper.mesh
-    )
+    assert mesh.nelements == 16 * given.upper.mesh.nelements
+    assert type(mesh) is type(given.upper.mesh)
     assert part_curves(given.upper, given.upper.mesh)["outer"].known
     nodes = mesh.dofs.get_facet_dofs(mesh.boundaries["outer"]).flatten()
     assert np.abs(np.hypot(*mesh.doflocs[:, nodes]) - 20).max() < 1e-12
@@ -226,13 +222,9 @@ def test_scenes_are_halved_with_the_curves_that_they_give():
 
 @pytest.mark.parametrize("dim", [2, 3])
 def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
-    """Near the long facets of the floor lie hundreds of small ones of the walls, with nearer
-    centres.
-    """
-    heights, kind = (
-        np.array([0.0, *np.geomspace(1e-6, 1, 25)]),
-        skfem.MeshTri if dim == 2 else skfem.MeshTet,
-    )
+    """Near the long facets of the floor lie small ones of the walls, with nearer centres."""
+    heights = np.array([0.0, *np.geomspace(1e-6, 1, 25)])
+    kind = skfem.MeshTri if dim == 2 else skfem.MeshTet
     mesh = kind.init_tensor(*[np.array([0.0, 1.0])] * (dim - 1), heights)
     sides = {"floor": (dim - 1, 0.0), "wall": (0, 0.0)}
     mesh = mesh.with_boundaries(
@@ -246,9 +238,7 @@ def test_facets_of_strongly_graded_meshes_keep_their_names(dim):
 
 
 def round_body(shape, second, n=5):
-    """A quarter of a body of revolution about z between two planes through the axis, and the
-    function that is zero on its outer surface, here the radius less that of the section.
-    """
+    """A quarter of a body of revolution about z between two planes through the axis."""
     radius = {
         "cone": lambda z: 2 - 0.4 * z,
         "torus": lambda z: 1 + np.sqrt(1 - (z - 0.5) ** 2),
@@ -269,9 +259,7 @@ def round_body(shape, second, n=5):
 @pytest.mark.parametrize("second", [False, True])
 @pytest.mark.parametrize("shape", ["cone", "torus", "groove", "spline"])
 def test_surfaces_that_are_no_spheres_are_met_up_to_their_rims(shape, second):
-    """New nodes are far nearer to the surface than the chords are, those on the rims too, and the
-    curve that a mesh itself makes is never refused.
-    """
+    """New nodes are far nearer to the surface than the chords are, those on the rims too."""
     mesh, off = round_body(shape, second)
     curves = boundary_curves(mesh)
     fine = straight(mesh)

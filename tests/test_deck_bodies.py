@@ -16,9 +16,7 @@ from contactopt.scenes.scene_files import read_scene_file
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_degree_is_that_of_the_mesh_whichever_way_it_comes(tmp_path, order):
-    """A cantilever from a file, through load_mesh and a Scene and through a scene file: the same
-    degree and the same deflection, which linear triangles make too small.
-    """
+    """A cantilever from a file has the same deflection, whichever way it is read."""
     kind, shape = ("CPE3", "CPE6")[order - 1], block("tri", order, (6, 1))
     sides = "\n".join(
         f"*NSET, NSET={name}\n" + ",\n".join(map(str, shape.on(axis, at)))
@@ -189,9 +187,7 @@ CARDS += "CTETRA,1,7,1,2,3,4\nCBAR,2,8,1,2\n"
     ],
 )
 def test_what_stiffens_no_body_is_told_in_every_run_with_the_mesh(tmp_path, name, text, told):
-    """Bars and shells that are no elements of a body, or have a section, in a remark of a run of a
-    scene that is made in Python from a mesh that was read before.
-    """
+    """Bars and shells that are no elements of a body, or have a section."""
     (tmp_path / name).write_text(text)
     mesh = load_mesh(tmp_path / name)
     sides = {"foot": lambda x: x[-1] == mesh.p[-1].min(), "wall": lambda x: x[0] == mesh.p[0].min()}

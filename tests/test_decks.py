@@ -1,7 +1,4 @@
-"""Input files of CalculiX and Abaqus, as Gmsh, FreeCAD, PrePoMax, HyperMesh and Abaqus write them:
-the volume, the area of each surface and the number of nodes are those that the file means, or
-the file is refused with its line.
-"""
+"""Input files of CalculiX and Abaqus, as Gmsh, FreeCAD and PrePoMax write them."""
 
 from __future__ import annotations
 

@@ -221,9 +221,7 @@ def test_what_holds_for_every_load_does_not_know_the_load(q_n):
 
 @pytest.mark.parametrize("apart", [1e-5, 1e-10, 1e-12, 1e-14])
 def test_forces_that_hardly_move_anything_are_remarked_on_however_small_the_residual(apart):
-    """Two contacts at one point, of which one has a soft spring of its own: rounding of q moves
-    the force from one to the other.
-    """
+    """Two contacts at one point, of which one has a soft spring of its own."""
     one, right = np.array([[1, 0.2], [0.2, 1]]), np.array([[1, 0], [0.7, 0]])
     Q = np.block([[one, one], [one, one + apart * np.eye(2)]])
     q = -(Q @ right.ravel()).reshape(2, 2)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from skfem import Basis, ElementHex1, MeshQuad
+from skfem import MeshQuad
 
-from contactopt.meshes.discs import extrude, half_disc
+from contactopt.meshes.discs import half_disc
 
 
 @pytest.mark.parametrize("sectors,count", [(1, 3), (2, 8), (3, 12)])
@@ -24,13 +24,3 @@ def test_half_disc(sectors, count):
     assert np.sum(np.abs(p[1]) < 1e-12) == 2 * count - 1
     mirrored = np.round(p * [[-1], [1]], 9)
     assert {tuple(c) for c in mirrored.T + 0.0} == {tuple(c) for c in np.round(p, 9).T + 0.0}
-
-
-def test_extrude():
-    p, t = half_disc(np.linspace(0.0, 1.0, 7), 2)
-    mesh = extrude(p, t, np.array([-1.0, -0.4, 0.0]))
-    assert mesh.p.shape == (3, 3 * p.shape[1]) and mesh.t.shape == (8, 2 * t.shape[1])
-    dx = Basis(mesh, ElementHex1(), intorder=2).dx
-    assert dx.min() > 0 and dx.sum() == pytest.approx(8 / 2 * np.sin(np.pi / 8))
-    area = mesh.boundary_facets().size
-    assert area == 2 * t.shape[1] + 2 * (8 + 12)

@@ -1,8 +1,4 @@
-"""Sections stand in the docstrings of public names, protocols and base classes, and nowhere else.
-
-Public are the names that `contactopt` and the folders among its public modules show in their
-`__init__`.
-"""
+"""Sections stand in the docstrings of public names, protocols and base classes."""
 
 import ast
 import inspect

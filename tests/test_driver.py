@@ -57,10 +57,8 @@ def test_without_an_iterate_the_start_is_the_answer_and_the_certificate_judges_i
 
 def test_limits_are_kept_and_the_last_iterate_survives():
     solution = solve(PROBLEM, Scripted(WRONG), max_iterations=7)
-    assert (
-        solution.status is Status.ITERATION_LIMIT
-        and solution.iterations == len(solution.history) == 7
-    )
+    assert solution.status is Status.ITERATION_LIMIT
+    assert solution.iterations == len(solution.history) == 7
     assert solution.reactions[0, 0] == pytest.approx(WRONG[6][0] * FORCE)
     slow = solve(PROBLEM, Scripted(WRONG, pause=0.02), time_limit=0.05)
     assert slow.status is Status.TIME_LIMIT and slow.iterations < 10
@@ -78,11 +76,8 @@ class Endless:
 
 def test_the_time_limit_ends_inner_iterations():
     solution = solve(PROBLEM, Endless(), time_limit=0.1)
-    assert (
-        solution.status is Status.TIME_LIMIT
-        and solution.iterations == 0
-        and solution.seconds["solve"] > 0.05
-    )
+    assert solution.status is Status.TIME_LIMIT and solution.iterations == 0
+    assert solution.seconds["solve"] > 0.05
 
 
 @pytest.mark.parametrize("method", ["apg", "lagrangian"])
@@ -94,8 +89,9 @@ def test_a_load_that_nothing_balances_does_not_outlast_the_time_limit(method):
     problem = InterfaceProblem(
         np.eye(6), rng.normal(size=(2, 3)), 1e-3, rng.normal(size=(6, 3)), [1.0, -1.0, 1.0]
     )
-    solution = solve(problem, method, time_limit=0.5, max_iterations=10**9)
-    assert not solution.solved and solution.seconds["solve"] < 5.0
+    begin = time.process_time()  # the clock depends on what else runs on the machine
+    assert not solve(problem, method, time_limit=0.5, max_iterations=10**9).solved
+    assert time.process_time() - begin < 5.0
 
 
 def test_a_method_that_repeats_itself_is_stopped():
@@ -115,19 +111,6 @@ def test_the_papers_criterion_is_recorded_and_can_stop_but_not_certify():
     assert loose.iterations < exact.iterations
     assert loose.history[-1]["change"] <= 1e-5 < loose.history[-2]["change"]
     assert all({"residual", "change", "seconds"} <= set(h) for h in loose.history)
-
-
-def test_pulling_bodies_apart_is_refused(punch):
-    pulled = InterfaceProblem(punch.Q, punch.q, punch.mu, punch.V, -punch.s)
-    with pytest.raises(InputError, match="pulls the bodies apart"):
-        solve(pulled)
-
-
-def test_unloaded_and_open_contacts():
-    at_rest = solve(InterfaceProblem(np.eye(2), np.zeros((1, 2)), 0.3))
-    apart = solve(InterfaceProblem(np.eye(2), [[1.0, 0.4]], 0.3))
-    assert at_rest.solved and apart.solved
-    assert not np.any(at_rest.reactions) and not np.any(apart.reactions)
 
 
 @pytest.mark.parametrize(
@@ -202,9 +185,7 @@ def test_a_tolerance_below_rounding_ends_without_an_exception():
 
 
 def test_fallbacks_are_told(caplog):
-    """Contacts at random places have no grid for a preconditioner; the answer says so, and so does
-    the log.
-    """
+    """Contacts at random places have no grid for a preconditioner."""
     rng = np.random.default_rng(1)
     A = rng.normal(size=(36, 36))
     problem = InterfaceProblem(
@@ -216,9 +197,8 @@ def test_fallbacks_are_told(caplog):
     assert solve(problem).notes == ()
     with caplog.at_level("INFO"):
         solution = solve(problem, "newton", linear="krylov")
-    assert solution.solved and any(
-        "no preconditioner fits" in sentence for sentence in solution.notes
-    )
+    assert solution.solved
+    assert any("no preconditioner fits" in sentence for sentence in solution.notes)
     assert "no preconditioner fits" in caplog.text
     assert solve(problem).notes == ()  # the notes of one solve are its own
 
@@ -226,17 +206,14 @@ def test_fallbacks_are_told(caplog):
 def test_the_default_says_when_it_changes_its_method(without_sweeps):
     """Rigid bodies that share forces among too many contacts: Newton's first steps get nowhere."""
     solution = solve(rigid_bodies(bodies=4, contacts=12, mu=0.8, seed=0))
-    assert solution.solved and any(
-        "the proximal loop take over" in sentence for sentence in solution.notes
-    )
+    assert solution.solved
+    assert any("the proximal loop take over" in sentence for sentence in solution.notes)
 
 
 def test_seconds_are_those_of_the_method_and_of_the_certificate(punch):
     solution = solve(punch)
-    assert (
-        set(solution.seconds) == {"solve", "certificate", "checks"}
-        and min(solution.seconds.values()) > 0
-    )
+    assert set(solution.seconds) == {"solve", "certificate", "checks"}
+    assert min(solution.seconds.values()) > 0
     assert solution.seconds["solve"] == solution.history[-1]["seconds"]
 
 
@@ -281,9 +258,7 @@ def problems_of_the_clock() -> dict[str, InterfaceProblem]:
 @pytest.mark.parametrize("method", ["auto", "nsgs", "proximal", "tresca"])
 @pytest.mark.parametrize("name", problems_of_the_clock())
 def test_steps_do_not_depend_on_the_clock(name, method, monkeypatch):
-    """A clock that runs a thousand times faster or slower: as many iterates, and the same ones, but
-    for the last digits, which depend on where an array begins in memory.
-    """
+    """A clock that runs a thousand times faster or slower."""
     problem, runs, first = problems_of_the_clock()[name], [], []
     clocks = {each: getattr(time, each) for each in ("perf_counter", "monotonic", "process_time")}
     for speed in (1.0, 1e3, 1e-3):

@@ -31,16 +31,6 @@ def cattaneo(distance: np.ndarray, a: float, c: float) -> tuple[np.ndarray, np.n
     return p, 0.5 * (p - c / a * np.sqrt(np.maximum(0.0, 1 - (distance / c) ** 2)))
 
 
-@pytest.mark.parametrize("c", [0.613, 0.3, 0.95])
-def test_edges_of_exact_tractions_in_a_line(c):
-    x = np.linspace(-1.25, 1.25, 101)
-    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
-    p, q = cattaneo(np.abs(x), 0.987, c)
-    r = 0.025 * np.stack([p, -q], axis=1)
-    assert contact_edge(scene, problem, r) == pytest.approx(0.987, rel=1e-9)
-    assert stick_edge(scene, problem, r)[0] == pytest.approx(c, rel=1e-9)
-
-
 @pytest.mark.parametrize("c", [0.613, 0.8])
 def test_forces_on_a_graded_line_act_beside_its_nodes(c):
     """Each is the integral of the traction times a hat, whose centroid is not at the node."""
@@ -55,24 +45,6 @@ def test_forces_on_a_graded_line_act_beside_its_nodes(c):
     r = np.stack([forces[0], -forces[1]], axis=1)
     assert contact_edge(scene, problem, r) == pytest.approx(1.0, rel=5e-3)  # .06 elements
     assert stick_edge(scene, problem, r)[0] == pytest.approx(c, rel=2e-3)
-
-
-@pytest.mark.parametrize("a", [0.987, 1.0, 1.013])
-@pytest.mark.parametrize(
-    "pressure, off",
-    [
-        (lambda s: (1 + 2 * s**2) * np.sqrt(1 - s**2), 1e-9),  # a punch x^4 on a half-plane
-        (lambda s: np.arccosh(1 / np.maximum(s, 1e-3)), 2e-3),  # a wedge, and a cone
-        (lambda s: np.sqrt(1 - s**2) * np.exp(-3 * s), 2e-3),
-    ],
-)
-def test_edges_under_other_profiles(pressure, off, a):
-    """Their squared pressures are no straight lines over x^2."""
-    x = np.linspace(-1.25, 1.25, 101)
-    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
-    p = np.where(np.abs(x) < a, pressure(np.minimum(np.abs(x) / a, 1.0)), 0.0)
-    r = 0.025 * np.stack([p, 0 * p], axis=1)
-    assert contact_edge(scene, problem, r) == pytest.approx(a, rel=off)
 
 
 def test_edges_of_exact_tractions_on_a_surface():
@@ -120,52 +92,70 @@ def test_a_surface_of_which_one_corner_is_open_is_no_disc():
     assert contact_edge(scene, problem, r) == pytest.approx(np.sqrt(areas[1:].sum()) / 2, rel=1e-12)
 
 
-def test_stick_edge_after_a_reversal():
-    x = np.linspace(-1.25, 1.25, 201)
-    scene, problem = contact(x[None], "plane-strain", np.full(201, 0.0125))
-    p, q = cattaneo(np.abs(x), 0.987, 0.4)
-    q = q - 2 * cattaneo(np.abs(x), 0.987, 0.7)[1]
-    r = 0.0125 * np.stack([p, -q], axis=1)
-    assert stick_edge(scene, problem, r)[0] == pytest.approx(0.7, rel=1e-9)
+def disc(x, half, centre=0.0):
+    return np.sqrt(np.maximum(0.0, 1 - ((x - centre) / half) ** 2))
 
 
-@pytest.mark.parametrize("centre,a", [(0.5, 0.5), (-0.313, 0.6), (0.0, 0.987)])
-def test_a_zone_anywhere_is_read_at_both_ends(centre, a):
-    x = np.linspace(-1.25, 1.25, 101)
-    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.025))
-    p, q = cattaneo(np.abs(x - centre), a, 0.6 * a)
-    r = 0.025 * np.stack([p, -q], axis=1)
-    assert contact_edge(scene, problem, r) == pytest.approx(a, rel=1e-9)
-    assert stick_edge(scene, problem, r)[0] == pytest.approx(0.6 * a, rel=1e-9)
+def profile(of, a):
+    """A pressure whose square is no straight line over x^2."""
+    return lambda x: np.where(np.abs(x) < a, of(np.minimum(np.abs(x) / a, 1.0)), 0.0)
 
 
-def test_a_stick_zone_off_the_centre_of_contact():
-    x = np.linspace(-1.25, 1.25, 201)
-    scene, problem = contact(x[None], "plane-strain", np.full(201, 0.0125))
-    p = np.sqrt(np.maximum(0.0, 1 - x**2))
-    stuck = np.sqrt(np.maximum(0.0, 1 - ((x - 0.2) / 0.5) ** 2))
-    r = 0.0125 * np.stack([p, -0.5 * (p - 0.4 * stuck)], axis=1)
-    assert stick_edge(scene, problem, r)[0] == pytest.approx(0.5, rel=1e-9)
-
-
-def test_several_patches_add_up():
-    x = np.linspace(-2.0, 2.0, 401)
-    scene, problem = contact(x[None], "plane-strain", np.full(401, 0.01))
-    p = sum(
-        np.sqrt(np.maximum(0.0, 1 - ((x - c) / a) ** 2)) for c, a in ((-1.1, 0.413), (0.9, 0.718))
+# end of the line and its nodes, pressure, friction, half-widths of contact and stick, and how near
+LINES = {
+    "after a reversal": (
+        (1.25, 201),
+        lambda x: disc(x, 0.987),
+        lambda x: cattaneo(x, 0.987, 0.4)[1] - 2 * cattaneo(x, 0.987, 0.7)[1],
+        (None, 0.7, 1e-9),
+    ),
+    "stick off the centre": (
+        (1.25, 201),
+        lambda x: disc(x, 1.0),
+        lambda x: 0.5 * (disc(x, 1.0) - 0.4 * disc(x, 0.5, 0.2)),
+        (None, 0.5, 1e-9),
+    ),
+    "two patches": (
+        (2.0, 401),
+        lambda x: disc(x, 0.413, -1.1) + disc(x, 0.718, 0.9),
+        None,
+        (0.413 + 0.718, None, 1e-9),
+    ),
+    # contact from the surface's end to 0.403, where the pressure is zero, as at -1.597
+    "to a corner": (
+        (1.0, 101),
+        lambda x: np.sqrt(np.maximum(0.0, 0.403 - x) * (x + 1.597)),
+        None,
+        ((1 + 0.403) / 2, None, 2e-3),
+    ),
+}
+for centre, a in ((0.5, 0.5), (-0.313, 0.6), (0.0, 0.987)):
+    LINES[f"centre {centre}"] = (
+        (1.25, 101),
+        lambda x, a=a, c=centre: disc(x, a, c),
+        lambda x, a=a, c=centre: cattaneo(x - c, a, 0.6 * a)[1],
+        (a, 0.6 * a, 1e-9),
     )
-    r = 0.01 * np.stack([p, 0 * p], axis=1)
-    assert contact_edge(scene, problem, r) == pytest.approx(0.413 + 0.718, rel=1e-9)
+for a in (0.987, 1.0, 1.013):
+    of = {
+        "punch x^4": (lambda s: (1 + 2 * s**2) * np.sqrt(1 - s**2), 1e-9),
+        "wedge": (lambda s: np.arccosh(1 / np.maximum(s, 1e-3)), 2e-3),
+        "falling": (lambda s: np.sqrt(1 - s**2) * np.exp(-3 * s), 2e-3),
+    }
+    for name, (shape, off) in of.items():
+        LINES[f"{name} {a}"] = (1.25, 101), profile(shape, a), None, (a, None, off)
 
 
-def test_a_zone_that_ends_at_a_corner_on_one_side():
-    """Contact from the surface's end to 0.4: the half-width is half the distance of the two."""
-    x = np.linspace(-1.0, 1.0, 101)
-    scene, problem = contact(x[None], "plane-strain", np.full(101, 0.02))
-    # zero at .403, its mirror image at -1.597
-    p = np.sqrt(np.maximum(0.0, 0.403 - x) * np.maximum(0.0, x + 1.597))
-    r = 0.02 * np.stack([p, 0 * p], axis=1)
-    assert contact_edge(scene, problem, r) == pytest.approx((1 + 0.403) / 2, rel=2e-3)
+@pytest.mark.parametrize("name", LINES)
+def test_edges_on_a_line(name):
+    (end, nodes), pressure, friction, (edge, stick, off) = LINES[name]
+    x, h = np.linspace(-end, end, nodes), 2 * end / (nodes - 1)
+    scene, problem = contact(x[None], "plane-strain", np.full(nodes, h))
+    r = h * np.stack([pressure(x), -friction(x) if friction else 0 * x], axis=1)
+    if edge is not None:
+        assert contact_edge(scene, problem, r) == pytest.approx(edge, rel=off)
+    if stick is not None:
+        assert stick_edge(scene, problem, r)[0] == pytest.approx(stick, rel=off)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -186,9 +176,7 @@ def test_a_half_model_is_read_as_the_whole(sign):
 
 @pytest.mark.parametrize("centre", [0.0, 1.0, 3.1, 5.9])
 def test_a_zone_across_the_seam_of_a_closed_line(centre):
-    """The same zone anywhere on a closed line of length 2 pi, also across the place where its
-    numbering begins.
-    """
+    """The same zone anywhere on a closed line of length 2 pi."""
     angle = np.linspace(0.0, 2 * np.pi, 240, endpoint=False)
     space = np.stack([np.cos(angle), np.sin(angle)])
     scene, problem = contact(space, "plane-strain", np.full(240, 2 * np.pi / 240))
@@ -236,32 +224,20 @@ def punch(c: float) -> tuple[Scene, InterfaceProblem, np.ndarray, np.ndarray, np
 
 @pytest.mark.parametrize("c", [0.613, 0.3, 0.87])
 def test_stick_edge_of_exact_slack_and_slip(c):
-    scene, problem, _, r, slip = punch(c)
+    scene, problem, distance, r, slip = punch(c)
     assert stick_edge(scene, problem, r)[0] == pytest.approx(c, rel=1e-9)
     assert stick_edge(scene, problem, r, slip)[0] == pytest.approx(c, rel=1e-9)
     assert stick_edge(scene, problem, r, slip * 1e-12)[0] == pytest.approx(c, rel=1e-9)
-
-
-def test_stick_edge_is_the_mean_of_what_slack_and_slip_read():
-    c = 0.613
-    scene, problem, distance, r, slip = punch(c)
-    moved = np.where(distance > c, np.maximum(0.0, distance - c + 0.004) ** 1.5, 0.0)[
-        :, None
-    ] * np.sign(slip)
+    # a small step does not move it, and it is the mean of what slack and slip read
+    step = (np.maximum(0.0, distance - c) ** 0.5)[:, None] * np.sign(slip)
+    assert stick_edge(scene, problem, r, step)[0] == pytest.approx(c, rel=1e-9)
+    farther = np.where(distance > c, np.maximum(0.0, distance - c + 0.004) ** 1.5, 0.0)
+    moved = farther[:, None] * np.sign(slip)
     assert stick_edge(scene, problem, r, moved)[0] == pytest.approx(c - 0.002, rel=1e-9)
 
 
-def test_slip_of_a_small_step_does_not_move_the_stick_edge():
-    c = 0.613
-    scene, problem, distance, r, slip = punch(c)
-    step = (np.maximum(0.0, distance - c) ** 0.5)[:, None] * np.sign(slip)
-    assert stick_edge(scene, problem, r, step)[0] == pytest.approx(c, rel=1e-9)
-
-
 def test_the_edge_of_a_flat_punch_is_that_of_the_surface():
-    """Every contact touches, and the pressure grows towards the corner: the half-width is exact.
-    Where it falls, contact may end within the last element.
-    """
+    """Every contact touches, and the pressure grows towards the corner: the half-width is exact."""
     scene = make_scene("rigid-punch-2d", mu=0.5)
     solved = solve_scene(scene, 8)
     problem, r = solved.reduction.problem, solved.solution.reactions

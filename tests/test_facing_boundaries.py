@@ -106,21 +106,14 @@ def test_the_command_lists_the_pairs(tmp_path, capsys):
     assert "block.y--floor.y+" in told and "block.x+-wall.x-" in told
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        (
-            "mu = 0.4",
-            "mu = 0.4\ndistance = 0.001",
-            "face each other within 0.001 mm; give a larger",
-        ),
-        ("mu = 0.4", "", "'mu' is missing"),
-        ('"auto"', '"all"', "there is no contacts 'all'; choose from auto"),
-        ("mu = 0.4", "mu = -0.4", "must be a finite number at least 0"),
-        ("mu = 0.4", "mu = 0.4\n[bodies.rigid]\nrigid = {}", "'rigid' has none"),
-        ("mu = 0.4", "mu = 0.4\ndistance = 0.015", "'wall' belongs to no contact"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    ("mu = 0.4", "mu = 0.4\ndistance = 0.001", "face each other within 0.001 mm; give a larger"),
+    ("mu = 0.4", "", "'mu' is missing"),
+    ('"auto"', '"all"', "there is no contacts 'all'; choose from auto"),
+    ("mu = 0.4", "mu = -0.4", "must be a finite number at least 0"),
+    ("mu = 0.4", "mu = 0.4\n[bodies.rigid]\nrigid = {}", "'rigid' has none"),
+    ("mu = 0.4", "mu = 0.4\ndistance = 0.015", "'wall' belongs to no contact"),
+])  # fmt: skip
 def test_what_cannot_be_found_is_told_in_a_sentence(tmp_path, old, new, words):
     path = tmp_path / "shelves.toml"
     path.write_text(TWO_SHELVES.replace(old, new))
@@ -144,9 +137,7 @@ def body_of_nodes(name, shape, at):
 
 @pytest.mark.parametrize("elements", [2, 1])
 def test_nodes_of_a_whole_body_are_no_surface_that_may_touch(tmp_path, elements):
-    """Gmsh's option SaveGroupsOfNodes writes the nodes of each body as a set; so does HyperMesh. A
-    set that holds a support is no surface either. With one element there is no node inside.
-    """
+    """Gmsh's option SaveGroupsOfNodes writes the nodes of each body as a set; so does HyperMesh."""
     low = block("quad", 1, (elements, 2))
     up = block("quad", 1, (elements, 2), first=101, at=(0.0, 2.0, 0.0))
     text = body_of_nodes("LOWER", low, 0.0) + body_of_nodes("UPPER", up, 2.0)

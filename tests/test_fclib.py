@@ -85,9 +85,8 @@ def store(group, matrix, storage):
 def test_global_form_is_condensed(storage, tmp_path):
     W, q = global_file(tmp_path / "g.hdf5", storage)
     problem = fclib.read(tmp_path / "g.hdf5")
-    assert np.allclose(dense(problem.Q), W, atol=1e-15) and np.allclose(
-        problem.q.ravel(), q, atol=1e-15
-    )
+    assert np.allclose(dense(problem.Q), W, atol=1e-15)
+    assert np.allclose(problem.q.ravel(), q, atol=1e-15)
     assert solve(problem, tol=1e-12).solved
 
 
@@ -100,24 +99,18 @@ def damaged(change):
     return make
 
 
-@pytest.mark.parametrize(
-    "make,words",
-    [
-        (lambda path: path.write_text("not hdf5"), "usable FCLib file"),
-        (lambda path: None, "usable FCLib file"),
-        (lambda path: h5py.File(path, "w").close(), "neither"),
-        (damaged(lambda f: f["fclib_global"].__delitem__("M")), "usable FCLib file"),
-        (damaged(lambda f: f["fclib_global/spacedim"].__setitem__(0, 5)), "spacedim is 5"),
-        (
-            damaged(lambda f: f["fclib_global/vectors/mu"].__setitem__(0, -1.0)),
-            "must not be negative",
-        ),
-        (damaged(lambda f: f["fclib_global/vectors/w"].__setitem__(0, np.nan)), "not finite"),
-        (damaged(lambda f: f["fclib_global/H/i"].__setitem__(0, 77)), "usable FCLib file"),
-        (damaged(lambda f: f["fclib_global/M/nz"].__setitem__(0, -7)), "storage"),
-        (damaged(lambda f: f["fclib_global/M/x"].__setitem__(0, 0.0)), "usable FCLib file"),
-    ],
-)
+@pytest.mark.parametrize("make,words", [
+    (lambda path: path.write_text("not hdf5"), "usable FCLib file"),
+    (lambda path: None, "usable FCLib file"),
+    (lambda path: h5py.File(path, "w").close(), "neither"),
+    (damaged(lambda f: f["fclib_global"].__delitem__("M")), "usable FCLib file"),
+    (damaged(lambda f: f["fclib_global/spacedim"].__setitem__(0, 5)), "spacedim is 5"),
+    (damaged(lambda f: f["fclib_global/vectors/mu"].__setitem__(0, -1.0)), "must not be negative"),
+    (damaged(lambda f: f["fclib_global/vectors/w"].__setitem__(0, np.nan)), "not finite"),
+    (damaged(lambda f: f["fclib_global/H/i"].__setitem__(0, 77)), "usable FCLib file"),
+    (damaged(lambda f: f["fclib_global/M/nz"].__setitem__(0, -7)), "storage"),
+    (damaged(lambda f: f["fclib_global/M/x"].__setitem__(0, 0.0)), "usable FCLib file"),
+])  # fmt: skip
 def test_malformed_files_are_refused_by_name(make, words, tmp_path):
     make(tmp_path / "bad.hdf5")
     with pytest.raises(InputError, match=words) as caught:

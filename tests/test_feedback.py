@@ -1,6 +1,4 @@
-"""Of 500 plausible wrong answers nearly all get a sentence that names the mistake; right answers
-with two digits are not called wrong; answers in other units are recognised.
-"""
+"""Of 500 plausible wrong answers nearly all get a sentence that names the mistake."""
 
 import tomllib
 from dataclasses import replace

@@ -1,6 +1,4 @@
-"""Bodies that only contact holds: exact states, independence of how they are fixed, and loads that
-nothing balances.
-"""
+"""Bodies that only contact holds: exact states, independence of how they are fixed."""
 
 from dataclasses import replace
 
@@ -44,9 +42,7 @@ def alone(part, floor=FLOOR, mu=0.5, **more):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_block_under_its_own_weight_without_friction(dim, degree):
-    """Confined sideways it stands in uniaxial strain: pressure = weight, and its mean sinks by rho
-    g h^2 / 3 E_oed.
-    """
+    """Confined sideways it stands in uniaxial strain."""
     sides = {"left": "x-", "right": "x+"} | ({"front": "y-", "back": "y+"} if dim == 3 else {})
     mesh = block([0.0] * dim, [1.0] * dim, [4] * dim)
     axes = {name: ("xy".index(side[0]), float(side[1] == "+")) for name, side in sides.items()}
@@ -72,9 +68,7 @@ def test_a_block_under_its_own_weight_without_friction(dim, degree):
 
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 def test_a_traction_holds_a_block_as_a_plate_does(mu):
-    """Uniform compression, once under a plate that may slide, once by a traction on a body that
-    floats.
-    """
+    """Uniform compression, once under a plate that may slide."""
     mesh = block([0, 0], [2, 1], [6, 4])
     pressed = Part("b", mesh, SOFT, loads=(Traction("top", (0.0, -3.0)),), contact="bottom")
     plate = Plate("top", {"y": -6.0}, glued=False)
@@ -88,9 +82,7 @@ def test_a_traction_holds_a_block_as_a_plate_does(mu):
 
 
 def test_a_roller_between_two_plates():
-    """A disc that touches a floor and a plate: both carry the force, and the tractions mirror each
-    other.
-    """
+    """A disc that touches a floor and a plate."""
     circle = skfem.MeshTri.init_circle(4)
     disc = circle.with_boundaries({"below": lambda x: x[1] < -0.5, "above": lambda x: x[1] > 0.5})
     roller = Part("roller", disc, SOFT, contact="below")
@@ -194,23 +186,15 @@ def test_a_scene_that_is_turned_has_the_same_answer(angle):
         assert np.allclose(a.reactions, b.reactions[::-1], atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "scene,message",
-    [
-        (stack(2, side=0.6), "body 'block.' slides off .translation along x"),
-        (stack(2, 3, side=0.6, width=3.0), "body 'block.' slides off .translation along x"),
-        (stack(2, weight=-1.0), "no contact holds body 'block.' .translation along y"),
-        (
-            stack(8, side=0.3, width=1.0),
-            "more than the contacts can hold: body 'block.' tips over .rotation in the x-y plane",
-        ),
-        (
-            stack(2, kind="axisymmetric", weight=-1.0),
-            "no contact holds body 'block.' .translation along z",
-        ),
-    ],
-    ids=["slides", "slides-3d", "lifts", "tips", "axis"],
-)
+@pytest.mark.parametrize("scene,message", [
+    (stack(2, side=0.6), "body 'block.' slides off .translation along x"),
+    (stack(2, 3, side=0.6, width=3.0), "body 'block.' slides off .translation along x"),
+    (stack(2, weight=-1.0), "no contact holds body 'block.' .translation along y"),
+    (stack(8, side=0.3, width=1.0),
+     "more than the contacts can hold: body 'block.' tips over .rotation in the x-y plane"),
+    (stack(2, kind="axisymmetric", weight=-1.0),
+     "no contact holds body 'block.' .translation along z"),
+], ids=["slides", "slides-3d", "lifts", "tips", "axis"])  # fmt: skip
 def test_loads_that_nothing_balances_name_body_and_motion(scene, message):
     with pytest.raises(InputError, match=message):
         solve(reduce_bodies(scene).problem)
@@ -224,21 +208,10 @@ def test_friction_holds_up_to_its_limit(side, holds):
         assert solve(problem, tol=1e-9).solved
 
 
-@pytest.mark.parametrize("side,holds", [(0.32, True), (0.35, False)])
-def test_a_tower_stands_up_to_its_limit(side, holds):
-    """Three blocks of width one: the resultant leaves the base at side / weight = width / height =
-    1 / 3.
-    """
-    problem = reduce_bodies(stack(3, side=side, mu=5.0)).problem
-    assert (escape(problem) is None) == holds
-
-
 @pytest.mark.parametrize("law", ["tied", "bilateral", "coulomb"])
 @pytest.mark.parametrize("cells", [3, 4])
 def test_a_scene_that_nothing_holds_is_solved_or_told_so(law, cells):
-    """Two blocks on each other without supports: in balance, in uniaxial compression, they are
-    solved, and a remark names the motions that are left; pulled, they are refused.
-    """
+    """Two blocks on each other without supports."""
 
     def told(pull, side=0.0):
         loads = (Traction("top", (side, -1.0)),), (Traction("bottom", (0.0, 1.0 - pull)),)
@@ -271,9 +244,7 @@ def test_plates_that_are_pulled_off_are_named():
 @pytest.mark.parametrize("law,holds", [("tresca", 0.25), ("frictionless", 0.0)])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_a_given_bound_of_friction_holds_up_to_bound_times_area(law, holds, dim):
-    """A block on an area of one, askew, pushed along the floor by F and pressed by one: it holds as
-    long as F <= bound times area. What pulls it off is told, too.
-    """
+    """A block on an area of one, askew, pushed along the floor by F and pressed by one."""
     part, c, s = Part("b", block([0.0] * dim, [1.0] * dim, [3] * dim), SOFT), 0.8, 0.6
     turn = np.eye(dim)
     turn[0, 0], turn[0, -1], turn[-1, 0], turn[-1, -1] = c, -s, s, c

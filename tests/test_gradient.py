@@ -1,6 +1,4 @@
-"""Gradients of quantities of scenes by the parameters of the scenes, against differences of solved
-scenes.
-"""
+"""Gradients of quantities of scenes by the parameters of the scenes."""
 
 from dataclasses import replace
 
@@ -96,9 +94,7 @@ def test_the_gradient_by_the_gap_and_the_friction_of_every_contact():
             q = problem.q + t * (name == "gap") * np.stack([gap, 0 * gap], axis=1)
             law = problem.law.shifted(t * friction) if name == "friction" else problem.law
             there = replace(problem, q=q, law=law)
-            ends.append(
-                replace(base.reduction, problem=there),
-            )
+            ends.append(replace(base.reduction, problem=there))
         values = [
             value("shift", Solved(end, solve(end.problem, tol=1e-13, start=base.solution)))
             for end in ends

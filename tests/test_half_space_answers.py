@@ -5,16 +5,7 @@ import pytest
 import skfem
 
 import contactopt
-from contactopt import (
-    HalfSpace,
-    Material,
-    Part,
-    Plate,
-    Rigid,
-    Scene,
-    Support,
-    scenes,
-)
+from contactopt import HalfSpace, Material, Part, Plate, Rigid, Scene, Support, scenes
 from contactopt.readings.half_space_readings import (
     contact_stiffness,
     pressure_distribution,
@@ -221,9 +212,7 @@ def test_prescribed_approach_is_the_total_force_turned_round():
 
 
 def test_half_space_meets_finite_elements():
-    """A block of finite elements, thick and wide beside its contact, is nearly the half-space of
-    the same points.
-    """
+    """A block of finite elements, thick and wide beside its contact."""
     from contactopt.meshes.structured import graded, rename, tensor_mesh
 
     x = np.linspace(-1.0, 1.0, 33)
@@ -277,9 +266,7 @@ def test_a_mesh_on_a_half_space_is_the_same_scene_turned_upside_down():
 
 
 def test_periodic_wavy_surface_is_westergaards():
-    """Mean pressure p on a rigid wave of amplitude h: contact of half-width a with p = pi E* h / L
-    sin^2(pi a / L).
-    """
+    """Mean pressure p on a rigid wave of amplitude h."""
     n, length, amplitude = 512, 8.0, 0.05
     x = ticks(n, length)
     flat = np.pi * E_STAR * amplitude / length
@@ -319,11 +306,8 @@ def test_rough_scene_slides_in_the_end():
     assert history["shear_force"][-1] == pytest.approx(0.3 * history["normal_force"][-1], rel=1e-3)
     assert np.all(np.diff(history["friction_work"]) > 0) and history["energy_error"].max() < 1e-9
     maps = surface_maps(result.reduction, result.solution)
-    assert maps["pressure"].shape == maps["gap"].shape == (48, 48) and maps["slip"].shape == (
-        48,
-        48,
-        2,
-    )
+    assert maps["pressure"].shape == maps["gap"].shape == (48, 48)
+    assert maps["slip"].shape == (48, 48, 2)
     np.testing.assert_allclose(
         np.minimum(maps["pressure"] / maps["pressure"].max(), maps["gap"]), 0, atol=1e-7
     )

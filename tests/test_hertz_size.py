@@ -21,8 +21,7 @@ def test_the_widths_of_named_scenes_are_those_of_their_references(name, argument
 
 
 def test_the_half_widths_of_an_ellipse_make_its_gap_zero():
-    """Inside, the displacement of Hertz's pressure is the approach less the gap: Johnson (4.25)
-    gives it as integrals over w, which quadrature finds here."""
+    """Inside, the displacement of Hertz's pressure is the approach less the gap."""
     F, modulus, small, large = 200.0, 115e3, 0.008, 0.27
     a, b = ellipse(F, modulus, small, large)
     for width, curvature in ((a, small), (b, large)):

@@ -1,6 +1,4 @@
-"""Input of every wrong kind ends in an answer or in the project's own exceptions: random wrong
-arguments through the public API and the command line.
-"""
+"""Input of every wrong kind ends in an answer or in the project's own exceptions."""
 
 from __future__ import annotations
 

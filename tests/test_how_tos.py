@@ -1,6 +1,4 @@
-"""The how-to pages run as they stand: files are written, commands executed, Python run with its own
-assertions.
-"""
+"""The how-to pages run as they stand: files are written, commands executed."""
 
 import inspect
 import re
@@ -18,21 +16,10 @@ from contactopt.cli import main
 
 SITE = Path(__file__).parents[1] / "experiments" / "site"
 PAGES = (
-    "bring_your_own_matrices",
-    "parts_from_cad",
-    "scene_files",
-    "check_before_solving",
-    "stop_and_go_on",
-    "explore",
-    "certificate",
-    "which_method",
-    "experiment_files",
-    "test_set",
-    "your_solver",
-    "figures_for_a_paper",
-    "from_calculix",
-    "take_home",
-)
+    "bring_your_own_matrices", "parts_from_cad", "scene_files", "check_before_solving",
+    "stop_and_go_on", "explore", "certificate", "which_method", "experiment_files", "test_set",
+    "your_solver", "figures_for_a_paper", "from_calculix", "take_home",
+)  # fmt: skip
 BLOCK = re.compile(r"```(python|toml|sh|text)\n(.*?)```", re.S)
 
 

@@ -60,9 +60,7 @@ def test_pressure_under_a_corner(upper, lower, infinite):
 
 @pytest.mark.parametrize("kind", ["quad", "tri"])
 def test_no_pressure_is_infinite_where_other_bodies_go_on(kind):
-    """A sleeve in two parts that are tied to each other, around a tube under pressure inside; the
-    seam is pulled, and its largest pressure is its least tension.
-    """
+    """A sleeve in two parts that are tied to each other, around a tube under pressure inside."""
     parts = []
     for name, low, high, cells in (("in", (1, 0), (2, 2), (6, 7)), ("a", (2, 0), (3, 1), (5, 4)),
                                    ("b", (2, 1), (3, 2), (5, 3))):  # fmt: skip

@@ -1,6 +1,4 @@
-"""A run that is killed after any of its steps leaves a file from which it can be resumed, with the
-same answer.
-"""
+"""A run that is killed after any of its steps leaves a file from which it can be resumed."""
 
 import os
 import shutil
@@ -179,9 +177,7 @@ HELD = {"check_before_solving": {"bodies.block.tractions.1.x": 20}}  # as the pa
 @pytest.mark.slow
 @pytest.mark.parametrize("name, adaptive", [*NAMED, *((page, True) for page in PAGES)])
 def test_a_path_with_an_accuracy(name, adaptive, tmp_path, monkeypatch):
-    """Every named scene and the parts of the how-tos, saved at each step, and resumed from the
-    first, some middle and the last one.
-    """
+    """Every named scene and the parts of the how-tos, saved at each step."""
     monkeypatch.chdir(tmp_path)
     states = of_a_how_to(name, tmp_path) if name in PAGES else as_path(name)
     if adaptive and any(part.elastic and not part.meshed for part in states[0].parts):

@@ -1,6 +1,4 @@
-"""Everything that solves from products with Q alone: operators, Newton steps, subproblems, nested
-meshes.
-"""
+"""Everything that solves from products with Q alone."""
 
 from dataclasses import replace
 
@@ -19,12 +17,7 @@ from contactopt import (
 )
 from contactopt.bodies.assembled import Work
 from contactopt.coupling.costs import AGAIN, estimates
-from contactopt.linear.operators import (
-    InterfaceOperator,
-    block,
-    loosened,
-    shifted,
-)
+from contactopt.linear.operators import InterfaceOperator, block
 from contactopt.methods.kernels.alart_curnier import coulomb_equations
 from contactopt.methods.kernels.krylov import Krylov, model_of
 from contactopt.methods.kernels.semismooth import Evaluated, Factored
@@ -78,22 +71,12 @@ def test_both_forms_are_the_same_operator_with_the_same_blocks(name):
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_estimated_diagonal_is_near_the_true_one_and_zero_where_nothing_moves(name):
-    explicit, implicit = forms(name)
-    true, estimate = np.diag(explicit.Q), implicit.Q.diagonal
-    assert np.array_equal(estimate == 0, true == 0)
-    ratio = estimate[true > 0] / true[true > 0]
-    assert ratio.min() > 0.2 and ratio.max() < 5
-
-
-@pytest.mark.parametrize("name", SMALL)
 @pytest.mark.parametrize("method", ["auto", "newton"])
 def test_answers_do_not_depend_on_the_form(name, method):
     explicit, implicit = forms(name, mu=0.3)
     a, b = solve(explicit, method, tol=1e-11), solve(implicit, method, tol=1e-11)
-    assert (
-        a.solved and b.solved and natural_map_residual(explicit, b.reactions, b.multipliers) < 1e-10
-    )
+    assert a.solved and b.solved
+    assert natural_map_residual(explicit, b.reactions, b.multipliers) < 1e-10
     assert np.allclose(a.reactions, b.reactions, atol=1e-8 * np.abs(a.reactions).max())
     assert a.products == 0 < b.products <= 90
     counts = [entry["products"] for entry in b.history]
@@ -106,9 +89,8 @@ def test_every_preconditioner_leads_to_the_same_answer(preconditioner):
     reference = solve(explicit, tol=1e-11).reactions
     for method, settings in (("newton", {}), ("alternating", {"normal": "pcg"})):
         solution = solve(implicit, method, tol=1e-8, preconditioner=preconditioner, **settings)
-        assert solution.solved and np.allclose(
-            solution.reactions, reference, atol=1e-5 * np.abs(reference).max()
-        )
+        assert solution.solved
+        assert np.allclose(solution.reactions, reference, atol=1e-5 * np.abs(reference).max())
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -156,15 +138,12 @@ def test_subproblems_meet_their_conditions(bilateral):
 def test_penalty_takes_products_too():
     explicit, implicit = forms("punch-2d")
     a, b = (solve(problem, "penalty", factor=1e7) for problem in (explicit, implicit))
-    assert b.products > 0 and np.allclose(
-        a.reactions, b.reactions, atol=1e-5 * np.abs(a.reactions).max()
-    )
+    assert b.products > 0
+    assert np.allclose(a.reactions, b.reactions, atol=1e-5 * np.abs(a.reactions).max())
 
 
 def test_auto_falls_back_on_the_entries_of_Q():
-    """Strong friction, where Newton's method needs the rest of the chain: an operator must not stop
-    it.
-    """
+    """Strong friction, where Newton's method needs the rest of the chain."""
     explicit, _ = forms("punch-2d", mu=5.0)
     wrapped = InterfaceOperator(lambda X, accuracy: explicit.Q @ X, np.diag(explicit.Q).copy())
     problem = InterfaceProblem(
@@ -267,20 +246,6 @@ def test_preconditioner_and_explicit_Q_exclude_each_other():
         run("punch-2d", Q="explicit", preconditioner="p21")
 
 
-def test_operators_that_share_their_work_count_together():
-    """A block, looser products and a shifted diagonal count with the operator that they are made
-    from; a scaled one does not.
-    """
-    Q = InterfaceOperator(lambda X, accuracy: 2 * X, np.full(4, 2.0), inexact=True)
-    x = np.ones(4)
-    assert np.all(Q @ x == 2) and Q.products == 1
-    assert np.all(block(Q, np.array([0, 2])) @ x[:2] == 2) and Q.products == 2
-    assert np.all(loosened(Q, 1e-3) @ x == 2) and Q.products == 3
-    assert np.all(shifted(Q, np.arange(4.0)) @ x == 2 + np.arange(4)) and Q.products == 4
-    other = Q.scaled(3.0, np.zeros(4))
-    assert np.all(other @ x == 6) and (other.products, Q.products) == (1, 4)
-
-
 @pytest.mark.parametrize(
     ("dim", "elements", "count", "options"),
     [
@@ -290,9 +255,7 @@ def test_operators_that_share_their_work_count_together():
     ],
 )
 def test_thin_tied_layers_are_solved_from_products_with_q(dim, elements, count, options):
-    """Layers tied to each other are the whole body. The thinnest of eight is a hundred times wider
-    than high, and held by tied pairs alone.
-    """
+    """Layers tied to each other are the whole body."""
     scene = scenes.flat_punch(dim, elements=elements)
     problem = reduce(layered(scene, count), **options)
     assert problem.Q.diagonal.min() >= 0.0  # signs of one pair say nothing of another

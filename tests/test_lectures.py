@@ -1,7 +1,4 @@
-"""The lectures can be taught with: few words, one idea, a figure, a question and minutes on every
-slide; the page for lecturers keeps its promises. tests/test_site.py looks at the slides in the
-browser.
-"""
+"""The lectures can be taught with: few words, one idea, a figure."""
 
 import re
 from pathlib import Path

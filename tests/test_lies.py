@@ -1,9 +1,4 @@
-"""No answer of random problems is called solved and is wrong, by a check that can fail.
-
-The problems are of the kinds that fool a certificate. Every answer that a method calls solved is
-checked contact by contact by `coulomb_check`, and by what the problem's making says: that it has no
-solution, or which reactions are the only ones.
-"""
+"""No answer of random problems is called solved and is wrong, by a check that can fail."""
 
 import numpy as np
 import pytest

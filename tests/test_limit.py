@@ -1,6 +1,4 @@
-"""The factor on a load that friction holds, against statics done by hand, Janssen's equation, and
-what a run solves just below and above it.
-"""
+"""The factor on a load that friction holds, against statics by hand and Janssen's equation."""
 
 import math
 import re
@@ -224,39 +222,22 @@ def test_the_last_step_of_a_path_is_the_load():
     assert found.interval == pytest.approx((-1.5, 1.5), rel=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("scene", "load", "factor", "said"),
-    [
-        (slope(0.0, 0.0), "block:left", 0.0, "any block:left"),
-        (slope(support=(Support("right", {"x": 0.0}),)), "block:left", np.inf, "supports bear"),
-        (pressed(), "block:top", np.inf, "below 0 times block:top, and at no larger"),
-        (
-            beneath(0.5),
-            "block:top",
-            np.inf,
-            "below 0.83333 times block:top, and at no larger ... load as given, friction can",
-        ),
-        (
-            beneath(0.65),
-            "block:top",
-            np.inf,
-            "below 1.0833 times block:top, and at no larger ... load as given, they do",
-        ),
-        (slope(0.0, 3.0), "block:left", 4.0, "slide away, tip over or lift off above 4 times"),
-        pytest.param(
-            *(slope(), "block:body_force", np.inf, "friction grows with the load"),
-            marks=pytest.mark.slow,
-        ),
-        (slope(30.0, 0.1), "block:body_force", 0.0, "whatever the factor on block"),
-        (slope(10.0, 0.1), "block:left:x", -0.15033, "At 1, the load as given, they do."),
-        (
-            slope(-30.0, 0.1),
-            "block:left:x",
-            1.1732,
-            "below 0.82679 times it. At 1, the load as given, friction can",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("scene", "load", "factor", "said"), [
+    (slope(0.0, 0.0), "block:left", 0.0, "any block:left"),
+    (slope(support=(Support("right", {"x": 0.0}),)), "block:left", np.inf, "supports bear"),
+    (pressed(), "block:top", np.inf, "below 0 times block:top, and at no larger"),
+    (beneath(0.5), "block:top", np.inf,
+     "below 0.83333 times block:top, and at no larger ... load as given, friction can"),
+    (beneath(0.65), "block:top", np.inf,
+     "below 1.0833 times block:top, and at no larger ... load as given, they do"),
+    (slope(0.0, 3.0), "block:left", 4.0, "slide away, tip over or lift off above 4 times"),
+    pytest.param(*(slope(), "block:body_force", np.inf, "friction grows with the load"),
+     marks=pytest.mark.slow),
+    (slope(30.0, 0.1), "block:body_force", 0.0, "whatever the factor on block"),
+    (slope(10.0, 0.1), "block:left:x", -0.15033, "At 1, the load as given, they do."),
+    (slope(-30.0, 0.1), "block:left:x", 1.1732,
+     "below 0.82679 times it. At 1, the load as given, friction can"),
+])  # fmt: skip
 def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, factor, said):
     found = limit(scene, load)
     assert found.factor == pytest.approx(factor, rel=1e-4), found
@@ -265,9 +246,7 @@ def test_zero_infinity_and_what_lies_between_are_said_in_words(scene, load, fact
 
 @pytest.mark.slow
 def test_a_wedge_that_locks_itself_rests_only_where_its_forces_arise():
-    """Forces in the cones balance any pull on it, but it lifts off where the pull exceeds the push
-    on its top: below .15 times the push.
-    """
+    """Forces in the cones balance any pull on it."""
     mesh = quadrilateral([(-0.5, 0), (0.5, 0), (1, 1), (-1, 1)], {}, (4, 2))
     loads = Traction("top", (0.0, -0.5)), BodyForce((0.0, 0.1))
     body = Part("wedge", mesh, Material(1000.0, 0.3), loads=loads)
@@ -317,9 +296,7 @@ def test_loads_that_are_not_there_are_refused_and_the_command_says_the_answer(ca
 
 
 def test_an_open_corner_that_closes_after_a_turn_is_not_counted():
-    """A bar leans at 60 degrees, touched at one corner of each end; moments about its foot give the
-    factor at which it slides. The other corner at the wall would close after 1.7 rad.
-    """
+    """A bar leans at 60 degrees, touched at one corner of each end."""
     length, width, lean, mu = 4.0, 0.2, math.pi / 3, 0.5
     cosine, sine = math.cos(lean), math.sin(lean)
     turned = np.array([[cosine, -sine], [sine, cosine]]) @ [

@@ -15,7 +15,7 @@ from scipy.sparse.linalg import spsolve
 
 from contactopt import scenes
 from contactopt.bodies.body import build_body
-from contactopt.bodies.solvers import SOLVERS, choose, make_solver, solver_type
+from contactopt.bodies.solvers import SOLVERS, choose, make_solver
 from contactopt.bodies.solvers.constants import FACTORS_UP_TO, PARDISO_FROM
 from contactopt.bodies.solvers.ordering import elimination_order
 from contactopt.bodies.solvers.system import System
@@ -125,21 +125,6 @@ def test_two_bodies_in_two_threads(name):
         np.testing.assert_allclose(x, solver.solve(b), rtol=1e-12, atol=1e-12 * np.abs(x).max())
 
 
-@pytest.mark.parametrize("name", SOLVERS)
-def test_products_with_the_trailing_block(name):
-    *_, last = args = BODIES["solid punch"]
-    solver = made(name, args)
-    load = np.random.default_rng(0).standard_normal((len(last), 2))
-    expected = made("superlu", args).trailing_inverse() @ load
-    limit = 1e-8 if name == "multigrid" else 1e-11
-    assert np.linalg.norm(solver.trailing_product(load) - expected) <= limit * np.linalg.norm(
-        expected
-    )
-    assert np.linalg.norm(
-        solver.trailing_product(load[:, 0]) - expected[:, 0]
-    ) <= limit * np.linalg.norm(expected)
-
-
 @pytest.mark.parametrize("name", ["superlu", "pardiso"])
 def test_the_order_of_the_trailing_unknowns_is_the_callers(name):
     *system, last = BODIES["solid punch"]
@@ -177,14 +162,6 @@ def test_choice_of_a_solver():
         assert choose(10**6, 2, pardiso) == name
         assert choose(PARDISO_FROM, 2, pardiso) == choose(PARDISO_FROM, 3, pardiso) == "superlu"
     assert make_solver("auto", BODIES["plane"]).name == "superlu"
-
-
-def test_what_a_solver_is_like_is_known_before_it_is_made():
-    for name in SOLVERS:
-        assert solver_type(name, 10, 3).iterative == (name == "multigrid")
-    assert solver_type("auto", 10**7, 3).iterative and not solver_type("auto", 10**7, 2).iterative
-    assert made("superlu", BODIES["plane"]).complete
-    assert not made("superlu", BODIES["plane"]._replace(trailing=None)).complete
 
 
 GRIDS = {2: (40, 40), 3: (12, 12, 12)}
@@ -268,9 +245,7 @@ def resident():
 
 @pytest.mark.slow
 def test_factors_are_freed_whatever_thread_made_them():
-    """SuperLU forgets its memory where another thread frees it: solvers made and dropped must not
-    add up.
-    """
+    """SuperLU forgets its memory where another thread frees it."""
     scene = scenes.flat_punch(3)
     arguments = system(scene, scene.lower, 8)
     before, sizes = set(threading.enumerate()), []  # threads of other tests may end meanwhile
@@ -290,9 +265,7 @@ def test_factors_are_freed_whatever_thread_made_them():
 
 
 def test_factors_may_be_freed_at_any_moment():
-    """The collector may free a solver while this very thread holds the locks of a pool that it is
-    starting.
-    """
+    """The collector may free a solver while this thread holds the locks of a pool."""
     program = """
 import gc
 from concurrent.futures import ThreadPoolExecutor

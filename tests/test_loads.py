@@ -76,8 +76,7 @@ def lame(r, radial):
 
 @pytest.mark.parametrize("kind, radial", [("axisymmetric", 3), ("plane-strain", 2)])
 def test_a_shell_under_inner_pressure_moves_as_lame_says(kind, radial):
-    """A quarter of a ring is a quarter of a cylinder, or, revolved, half a hollow sphere; of the
-    second degree, converging with the square of the size of its straight sides."""
+    """A quarter of a ring is a quarter of a cylinder, or, revolved, half a hollow sphere."""
     errors = []
     for count in (8, 16):
         r, a = np.meshgrid(

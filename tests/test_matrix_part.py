@@ -1,7 +1,4 @@
-"""A body given by its matrices stands wherever one with a mesh does.
-
-Its matrices are assembled here with scikit-fem alone, so that they know nothing of ours.
-"""
+"""A body given by its matrices stands wherever one with a mesh does."""
 
 from dataclasses import replace
 
@@ -252,9 +249,7 @@ def test_multi_point_constraints_make_points_follow():
 
 
 def test_a_half_space_and_a_patch():
-    """Bodies by matrices lie on half-spaces as on other bodies; facets of 8 nodes carry a constant
-    pressure exactly.
-    """
+    """Bodies by matrices lie on half-spaces as on other bodies."""
     base = given()
     x = np.linspace(-1, 1, 7)
     space = HalfSpace("space", Material(E, NU), (x,), force={"y": -1.0})

@@ -4,11 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from skfem import Basis, ElementQuad1, Functional
 
-from contactopt.meshes.structured import (
-    contact_grid,
-    graded,
-    half_sphere_section,
-)
+from contactopt.meshes.structured import contact_grid, graded, half_sphere_section
 
 
 @given(st.floats(0.1, 1e4), st.floats(1e-3, 2), st.floats(1.05, 2))

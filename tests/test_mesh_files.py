@@ -1,6 +1,4 @@
-"""Meshes from files: geometry and groups as they were written, faults repaired or refused in a
-sentence.
-"""
+"""Meshes from files: geometry and groups as they were written."""
 
 import logging
 import os
@@ -85,9 +83,8 @@ def test_repairs_are_logged(tmp_path, caplog):
     )  # the second the wrong way round, the third the first again
     with caplog.at_level(logging.INFO):
         mesh = load_mesh(write(tmp_path / "a.vtu", points, [("quad", cells)]))
-    assert (
-        mesh.nelements == 2 and mesh.p.shape[1] == 6 and volume(mesh) == pytest.approx(2, rel=1e-8)
-    )
+    assert mesh.nelements == 2 and mesh.p.shape[1] == 6
+    assert volume(mesh) == pytest.approx(2, rel=1e-8)
     assert flux(mesh) == pytest.approx(4)
     for what in (
         "nodes that lie on others",
@@ -348,29 +345,20 @@ def test_results_are_passed_over_and_free_formats_are_free(tmp_path, name, text,
             assert "\n" not in str(error)
 
 
-@pytest.mark.parametrize(
-    "name, text, words",
-    [
-        ("a.mesh", MEDIT.replace("Edges", "Polygons"), "line 9: Polygons are not read"),
-        ("a.msh", MSH2.replace("7 7 1 3 4", "7 7 1 3 9"), "an element names a node that is not"),
-        ("a.msh", MSH2.replace("3 1 1 0", "3 1 x 0"), "a number or a word is not where"),
-        ("a.mesh", MEDIT.replace("Dimension 2\n", ""), "must stand before Vertices"),
-        (
-            "a.mesh",
-            MEDIT.replace("1 3 4 7", "1 3 4"),
-            "Triangles: 2 times 4 numbers are announced, and 7",
-        ),
-        ("a.su2", SU2.replace("5 0 1 2 0", "22 0 1 2 4 5 6 0"), r"line 4: elements of type 22"),
-        ("a.su2", SU2 + "NDIME= 2\n", r"line 22: it has several zones"),
-        ("a.su2", SU2[:-6], "ends before row 1 of MARKER_ELEMS"),
-        (
-            "a.mesh",
-            "MeshVersionFormatted 2\nDimension 3\nTetrahedraP2\n",
-            r"line 3: TetrahedraP2 are not read",
-        ),
-        ("a.unv", "    -1\n  2411\n", "its ending names no format"),
-    ],
-)
+@pytest.mark.parametrize("name, text, words", [
+    ("a.mesh", MEDIT.replace("Edges", "Polygons"), "line 9: Polygons are not read"),
+    ("a.msh", MSH2.replace("7 7 1 3 4", "7 7 1 3 9"), "an element names a node that is not"),
+    ("a.msh", MSH2.replace("3 1 1 0", "3 1 x 0"), "a number or a word is not where"),
+    ("a.mesh", MEDIT.replace("Dimension 2\n", ""), "must stand before Vertices"),
+    ("a.mesh", MEDIT.replace("1 3 4 7", "1 3 4"),
+     "Triangles: 2 times 4 numbers are announced, and 7"),
+    ("a.su2", SU2.replace("5 0 1 2 0", "22 0 1 2 4 5 6 0"), r"line 4: elements of type 22"),
+    ("a.su2", SU2 + "NDIME= 2\n", r"line 22: it has several zones"),
+    ("a.su2", SU2[:-6], "ends before row 1 of MARKER_ELEMS"),
+    ("a.mesh", "MeshVersionFormatted 2\nDimension 3\nTetrahedraP2\n",
+     r"line 3: TetrahedraP2 are not read"),
+    ("a.unv", "    -1\n  2411\n", "its ending names no format"),
+])  # fmt: skip
 def test_markers_of_su2_keep_their_names_and_second_orders_are_refused(tmp_path, name, text, words):
     """A number and a name that meshio counts to the same number are two boundaries."""
     (tmp_path / "whole.su2").write_text(SU2, "utf-8")

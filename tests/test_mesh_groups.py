@@ -21,11 +21,8 @@ def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
     )
     whole, left = load_mesh(path), load_mesh(path, "left")
     assert whole.nelements == 2 and left.nelements == 1
-    assert (
-        set(whole.boundaries) == {"floor"}
-        and len(whole.boundaries["floor"]) == 2
-        and len(left.boundaries["floor"]) == 1
-    )
+    assert set(whole.boundaries) == {"floor"} and len(whole.boundaries["floor"]) == 2
+    assert len(left.boundaries["floor"]) == 1
     tags = {"gmsh:physical": [np.array([3, 4])]}
     path = write(
         tmp_path / "a.vtu", SQUARE, [("quad", TWO)], cell_data={"part": [np.array([3, 4])]}
@@ -39,38 +36,6 @@ def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
     assert load_mesh(path, "4").p[0].min() == 1
 
 
-TWO_BODIES = """*Heading
-** two bricks, each with its own block of nodes, as CalculiX takes them
-*NODE, NSET=NLOW
-{low}
-*ELEMENT, TYPE=C3D20R, ELSET=LOW
-1,1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,
-16,17,18,19,20
-*Node
-{up}
-*Element, type=c3d20r, elset=up
- 7,101,102,103,104,105,106,107,108,109,110,111,112,113,114,115,
-116,117,118,119,120
-*ELEMENT, TYPE=SPRINGA, ELSET=SPRINGS
-9, 1, 101
-*NSET, NSET=FLOOR
-1, 2, 3, 4,
-*NSET, NSET=RANGE, GENERATE
-5, 8, 1
-*NSET, NSET=BOTH
-FLOOR, range, 101
-*ELSET, ELSET=ALL
-LOW, up
-*SURFACE, NAME=TOUCH
-up, S1
-LOW, S2
-*STEP
-*NODE PRINT, NSET=FLOOR
-U
-*END STEP
-"""
-
-
 def brick_of_twenty(height, first):
     """Lines of the nodes of a brick of second order, numbered from `first`."""
     corners = np.array(
@@ -78,32 +43,6 @@ def brick_of_twenty(height, first):
     )
     places = np.concatenate([corners, [corners[list(edge)].mean(axis=0) for edge in BRICK_EDGES]])
     return "\n".join(f"{first + i}, {x}, {y}, {z + height}" for i, (x, y, z) in enumerate(places))
-
-
-def test_two_bodies_of_calculix_with_their_own_nodes_sets_and_surfaces(tmp_path):
-    (tmp_path / "nodes.inc").write_text("*NODE\n" + brick_of_twenty(1.0, 101) + "\n")
-    text = TWO_BODIES.format(low=brick_of_twenty(0.0, 1), up=brick_of_twenty(1.0, 101))
-    included = text.replace("*Node\n" + brick_of_twenty(1.0, 101), "*INCLUDE, INPUT=nodes.inc")
-    for content in (text, included):
-        (tmp_path / "two.inp").write_text(content)
-        low, up = load_mesh(tmp_path / "two.inp", "LOW"), load_mesh(tmp_path / "two.inp", "up")
-        for mesh, z in ((low, 0), (up, 1)):
-            assert type(mesh) is skfem.MeshHex2 and volume(mesh) == pytest.approx(1.0)
-            assert (mesh.p[2].min(), mesh.p[2].max()) == (z, z + 1)
-            assert flux(mesh, "TOUCH") == pytest.approx(1 - 2 * z)
-        assert flux(low, "FLOOR") == pytest.approx(0) and flux(low, "RANGE") == pytest.approx(1)
-        assert len(low.boundaries["BOTH"]) == 6 and "FLOOR" not in up.boundaries
-    for old, new, words in (
-        ("101,102", "999,102", "names a node that is not there"),
-        ("16,17,18,19,20\n*Node", "16,17,18,19\n*Node", "line 25: an element C3D20R lacks"),
-        ("*Heading", "*INCLUDE, INPUT=two.inp", "include each other"),
-        ("TYPE=C3D20", "TYPE=C3D21", "elements of type C3D21R are not known"),
-        ("up, S1", "upper, S1", "there is no set upper of elements"),
-        ("FLOOR, range", "FLOOR, RANGES", "there is no set RANGES of nodes"),
-    ):
-        (tmp_path / "two.inp").write_text(text.replace(old, new))
-        with pytest.raises(InputError, match=words):
-            load_mesh(tmp_path / "two.inp", "LOW")
 
 
 ASSEMBLY = """*Heading
@@ -150,9 +89,7 @@ Low._Over_S2, S3
 
 
 def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
-    """The upper brick is lifted by 3 and turned by a quarter about the edge y at that height:
-    (x, y, z) goes to (z, y, 3 - x).
-    """
+    """The upper brick is lifted by 3 and turned by a quarter about the edge y at that height."""
     path, text = tmp_path / "two.inp", ASSEMBLY.format(brick=brick_of_twenty(0.0, 1))
     path.write_text(text)
     low, up = load_mesh(path, "Low"), load_mesh(path, "Up")
@@ -188,9 +125,7 @@ def test_instances_of_a_part_have_their_places_and_their_own_sets(tmp_path):
 
 
 def test_sets_of_the_elements_of_a_body_are_no_bodies(tmp_path):
-    """Abaqus writes an internal set of elements for each surface. A set of all elements of two
-    bodies is none either, and hides none.
-    """
+    """Abaqus writes an internal set of elements for each surface."""
     path = tmp_path / "strip.inp"
     nodes = "\n".join(f"{i + 3 * j + 1}, {i}, {j}" for j in range(2) for i in range(3))
     path.write_text(
@@ -307,20 +242,3 @@ def test_exodus_blocks_and_sides_that_are_not_known_are_refused(tmp_path):
     skin = {"eb_prop1": ([1, 2, 3, 4], ""), "eb_names": names, "connect4": ([[41, 42, 43]], "TRI3")}
     tip = change("tip", **skin, elem_ss1=([4], ""), side_ss1=([2], ""))
     np.testing.assert_array_equal(tip.boundaries["side 1"], tip.boundaries["tip"])
-
-
-@pytest.mark.parametrize("kind,count", [("CAX8R", 8), ("CPE4", 4), ("CPS6", 6), ("CAX3", 3)])
-def test_plane_elements_of_calculix(tmp_path, kind, count):
-    corners = [[1, 0], [2, 0], [2, 1], [1, 1]] if count in (4, 8) else [[1, 0], [2, 0], [1, 1]]
-    places = np.array(corners, dtype=float)
-    if count in (6, 8):
-        places = np.concatenate([places, (places + np.roll(places, -1, axis=0)) / 2])
-    lines = [f"{10 * i + 10}, {x}, {y}" for i, (x, y) in enumerate(places)]
-    names = ", ".join(str(10 * i + 10) for i in range(count))
-    text = "\n".join(
-        ["*NODE", *lines, f"*ELEMENT, TYPE={kind}", f"3, {names}", "*SURFACE, NAME=LOW", "3, S1"]
-    )
-    (tmp_path / "a.inp").write_text(text)
-    mesh = load_mesh(tmp_path / "a.inp")
-    assert volume(mesh) == pytest.approx(1 if count in (4, 8) else 0.5)
-    assert np.all(mesh.p[1, mesh.facets[:, mesh.boundaries["LOW"]]] == 0)

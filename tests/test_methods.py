@@ -133,9 +133,7 @@ CYCLES = {"alternating": NORMAL, "lagrangian": NORMAL, "tresca": [1.0, 14.5]}
 
 @pytest.mark.parametrize("name", CYCLES)
 def test_a_known_cycle_is_recognised_and_relaxation_breaks_it(name):
-    """K = [[1, 1.5], [1.5, 4]], f = (-10, 1): the iteration goes between two normal forces, from
-    the friction coefficient K_tt / |K_tn| = 2 / 3 on.
-    """
+    """K = [[1, 1.5], [1.5, 4]], f = (-10, 1)."""
     problem = one_contact((-10.0, 1.0), 1.0)
     last = solve(problem, name, max_iterations=2000)
     before = solve(problem, name, max_iterations=last.iterations - 1)

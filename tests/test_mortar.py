@@ -90,32 +90,13 @@ CUTS = [(False, False), (True, True), (False, True)]  # quadrilaterals, triangle
 
 
 def check_exact(m, upper: Faces, lower: Faces) -> None:
-    """Row sums, linear fields, forces of uniform pressure; all on flat surfaces that cover each
-    other.
-    """
+    """Row sums, linear fields, forces of uniform pressure."""
     for W, surface in zip(m.weights, (upper, lower)):
         assert np.abs(W.sum(axis=1) - 1).max() < 1e-12
         assert np.abs(W @ surface.points.T - m.points.T).max() < 1e-11
         assert np.abs(m.areas @ W - integrals(surface)).max() < 1e-12 * m.areas.sum()
     assert np.abs(m.gap).max() < 1e-12 and not np.any(m.lever)
     assert np.all(m.areas > 0)
-
-
-@pytest.mark.parametrize("weight", [(0.7, False), (2 * np.pi, True)])
-@pytest.mark.parametrize("own", SIDES)
-@pytest.mark.parametrize("ratio", RATIOS)
-@pytest.mark.parametrize("degree,cut", [(1, False), (2, False), (2, True)])
-def test_lines_pass_on_linear_fields_and_uniform_pressure(degree, cut, ratio, own, weight):
-    upper = line(grid(ratio[0], power=1.3), degree, False, cut, weight=weight)
-    lower = line(grid(ratio[1]), degree, True, cut, weight=weight)
-    m = mortar(upper, lower, own)
-    check_exact(m, upper, lower)
-    assert np.allclose(m.normals, [[0], [1]], atol=1e-14)
-    if own is None:
-        assert m.own == 1  # more contacts, or as many
-        assert mortar(replace(lower, turn=-lower.turn), replace(upper, turn=-upper.turn)).own == (
-            ratio[0] == ratio[1]
-        )
 
 
 @pytest.mark.parametrize("own", SIDES)
@@ -157,9 +138,7 @@ def test_distorted_faces_are_exact_to_the_quadrature(degree, cuts, own):
 @pytest.mark.parametrize("own", ["upper", "lower"])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_partial_overlap_integrates_over_the_common_part(degree, own):
-    """Contacts beyond the edge of the other surface keep their places; those that face nothing are
-    left out.
-    """
+    """Contacts beyond the edge of the other surface keep their places."""
     for upper, lower, content in (
         (line(grid(5, 0.13, 0.77), degree, False), line(grid(10), degree, True), 0.64),
         (line(grid(5, 0.43, 1.77), degree, False), line(grid(10), degree, True), 0.57),
@@ -227,9 +206,7 @@ def roof(x: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("cuts", CUTS)
 @pytest.mark.parametrize("degree", [1, 2])
 def test_curved_surfaces_are_in_equilibrium_and_close_with_the_mesh(degree, cuts, place):
-    """No resultant force or moment, whatever the forces; gaps and levers of the order of the
-    geometry.
-    """
+    """No resultant force or moment, whatever the forces."""
     own = ("upper", "lower")[(degree + (place is dome)) % 2]
     gaps = []
     for n in (4, 8) if degree == 1 else (3, 6):
@@ -274,9 +251,7 @@ def test_turned_mirrored_moved_and_in_other_units():
 
 @pytest.mark.parametrize("weight", [(1.0, False), (2 * np.pi, True)])
 def test_finer_contacts_see_no_kinks_of_linear_elements(weight):
-    """A parabola that both sides interpolate linearly has no relative displacement but a constant,
-    away from uneven cells.
-    """
+    """A parabola that both sides interpolate linearly has only a constant relative displacement."""
     upper, lower = line(grid(8), 1, False, weight=weight), line(grid(24), 1, True, weight=weight)
     m = mortar(upper, lower)
     inner = (m.points[0] > 0.2) & (m.points[0] < 0.8)

@@ -7,9 +7,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from contactopt import (
-    InputError,
-)
+from contactopt import InputError
 from contactopt.checks import said_once
 from contactopt.coupling import segments
 from contactopt.coupling.facing import Facets, facing_pairs
@@ -26,9 +24,7 @@ def test_a_gap_of_the_geometry_stays_a_lever():
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_true_gap_of_curved_surfaces(degree):
-    """With its curve, a polygon of chords has the gap of the parabola that it stands for, up to
-    what a linear fit misses.
-    """
+    """With its curve, a polygon of chords has the gap of the parabola that it stands for."""
     parabola = lambda x: np.stack([x[0], x[0] ** 2 / 4])  # noqa: E731
     upper = line(
         grid(6, -1, 1),
@@ -132,17 +128,12 @@ def test_the_search_costs_the_same_at_any_gap(gap):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("cells", [3, 5, 7, 12])
 def test_contacts_below_the_steep_side_of_a_roller_stay_open(degree, cells):
-    """The cell in which the roller ends: its gap and its normals are not continued to the node
-    beyond.
-    """
+    """Gap and normals are not continued beyond the cell in which the roller ends."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 41)
     roller = line(np.sin(angle), degree, False, y=lambda x: 1 - np.sqrt(np.maximum(0.0, 1 - x**2)))
     m = mortar(roller, line(grid(cells, -1.37, 1.21), degree, True), "lower")
-    assert (
-        np.allclose(m.normals, [[0], [1]])
-        and m.gap.min() > -0.1
-        and np.abs(m.points[0]).max() < 1 + 1e-12
-    )
+    assert np.allclose(m.normals, [[0], [1]]) and m.gap.min() > -0.1
+    assert np.abs(m.points[0]).max() < 1 + 1e-12
     assert m.gap[np.abs(m.points[0]) > 0.8].min() > 0.3
     # the last facets are steeper than those that face anything
     assert m.areas.sum() == pytest.approx(2.0, rel=4e-3)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import skfem
-from conftest import MATERIAL, two_blocks
-from mortar_scenes import couple, press_fit, resultants, ring, slab
+from conftest import MATERIAL, block, two_blocks
+from mortar_scenes import couple, press_fit, resultants, ring
 
 from contactopt import (
     Contact,
@@ -58,9 +58,7 @@ def test_pressure_where_the_other_surface_ends_within_a_face(degree, covered):
 @pytest.mark.parametrize("dim", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_uniform_load_closes_any_gap(dim, seed):
-    """Turned, moved, in other units, on meshes of other kinds: without lateral contraction the
-    pressure is uniform.
-    """
+    """Turned, moved, in other units, on meshes of other kinds."""
     rng = np.random.default_rng([dim, seed])
     unit, gap = 10 ** rng.uniform(-3, 3), 10 ** rng.uniform(-2, 1)
     turn = np.linalg.qr(rng.normal(size=(dim, dim)))[0] * unit
@@ -102,8 +100,8 @@ def test_patch_test_uniform_pressure_is_exact(kind, degree, cut, cells, own):
     if kind == "solid" and degree == 2:
         b = {3: 3, 6: 4, 7: 5}[b]
     scene = two_blocks(kind, force=3.0)
-    upper = replace(scene.upper, mesh=slab(kind, 0, 1, a))
-    lower = replace(scene.lower, mesh=slab(kind, -2, 0, b, power=1.0))
+    upper = replace(scene.upper, mesh=block(kind, 0, 1, a, layers=3))
+    lower = replace(scene.lower, mesh=block(kind, -2, 0, b, layers=3, power=1.0))
     coupled = couple(with_elements(replace(scene, upper=upper, lower=lower), degree, cut), own)
     solution = solve(coupled.problem, tol=1e-12)
     pressure = solution.reactions[:, 0] / coupled.problem.areas
@@ -135,9 +133,7 @@ def test_a_press_fit_is_of_second_order(own):
 @pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_closed_ring_is_in_equilibrium(degree, cut, interference):
-    """Polygons of 24 and 36 edges in each other, any forces: no resultant force and no resultant
-    moment.
-    """
+    """Polygons of 24 and 36 edges in each other, any forces."""
     outer = Part(
         "outer", ring(2, 3, 2, 24, 2 * np.pi), MATERIAL, (Support("outer"),), contact="inner"
     )
@@ -164,9 +160,7 @@ def test_a_closed_ring_is_in_equilibrium(degree, cut, interference):
 
 @pytest.mark.parametrize("name", ["cylinder", "sphere"])
 def test_hertz_on_meshes_two_to_three(name, monkeypatch):
-    """Peak and width within .2 % on at most 10,000 unknowns; no larger error of the pressure than
-    on matching meshes.
-    """
+    """Peak and width within .2 % on at most 10,000 unknowns."""
     monkeypatch.setitem(round_bodies.GROWTH, 2, 1.5)  # coarse away from the contact
     scene = getattr(scenes, name)(mu=0.0, force=30.0 if name == "cylinder" else 1.0)
     scene = with_elements(scene, 2)
@@ -193,9 +187,7 @@ def test_hertz_on_meshes_two_to_three(name, monkeypatch):
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_a_half_model_is_half_of_the_whole(degree):
-    """The component that symmetry holds is taken at the node and at the place facing it alone, and
-    the rounding of kinks sees the mirror image.
-    """
+    """The component that symmetry holds is taken at the node and at the place facing it alone."""
     results = []
     for copies in (1, 2):
         parts = []
@@ -263,9 +255,7 @@ def test_a_quarter_of_plates_in_space_is_a_quarter_of_the_whole(carrier):
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("carrier", ["upper", "lower"])
 def test_a_quarter_of_a_press_fit_is_half_of_a_half(degree, carrier):
-    """On curved surfaces, with friction: at planes of symmetry nothing slips while the rings press
-    each other.
-    """
+    """With friction on curved surfaces: at planes of symmetry nothing slips."""
     results = []
     for quarters in (1, 2):
         parts = []
@@ -292,9 +282,7 @@ def test_a_quarter_of_a_press_fit_is_half_of_a_half(degree, carrier):
 
 
 def test_a_small_block_on_a_large_one():
-    """Contacts of the larger, finer surface reach beyond the block's edge: the approach converges
-    to that of matching meshes.
-    """
+    """Contacts of the larger, finer surface reach beyond the block's edge."""
     x = np.linspace(-1, 2, 49)
     results = []
     for cells, own in ((16, None), (5, "lower"), (11, "lower")):
@@ -315,7 +303,9 @@ def test_a_small_block_on_a_large_one():
 
 def test_mortar_is_chosen_where_nodes_do_not_match(caplog):
     scene = two_blocks("plane-strain", force=3.0)
-    finer = replace(scene, lower=replace(scene.lower, mesh=slab("plane-strain", -2, 0, 7)))
+    finer = replace(
+        scene, lower=replace(scene.lower, mesh=block("plane-strain", -2, 0, 7, layers=3))
+    )
     with caplog.at_level(logging.INFO, logger="contactopt.coupling"):
         same, other = reduce_bodies(scene), reduce_bodies(finer)
     assert (same.coupling.kind, other.coupling.kind, other.coupling.carrier) == (
@@ -334,9 +324,7 @@ def test_mortar_is_chosen_where_nodes_do_not_match(caplog):
 
 @pytest.mark.parametrize("carrier", [None, "lower"])
 def test_contacts_on_a_held_edge_are_no_more_than_the_other_side_can_tell_apart(carrier):
-    """A plate that is clamped at its edge, and finer than the other one: carried by its own nodes,
-    pressures on that edge alternate.
-    """
+    """Carried by its own nodes, pressures on a clamped edge of the finer plate alternate."""
 
     def plate(x, y, z):
         mesh = skfem.MeshHex.init_tensor(*(np.array(v, float) for v in (x, y, z)))

@@ -2,23 +2,16 @@
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 from test_linear import BODIES, made, system
 
 from contactopt import scenes
 from contactopt.bodies.body import build_body
 from contactopt.bodies.solvers import multigrid
-from contactopt.bodies.solvers import sparse_products as products
 from contactopt.bodies.solvers.constants import RTOL
-from contactopt.bodies.solvers.multigrid import (
-    conjugate_gradients,
-    nodal_blocks,
-)
-from contactopt.bodies.solvers.sparse_products import SparseProduct
+from contactopt.bodies.solvers.multigrid import conjugate_gradients, nodal_blocks
 from contactopt.bodies.solvers.system import Submatrix, System
 from contactopt.errors import BackendError, InputError
-from contactopt.linear.concurrency import Crew
 
 
 def energy(A, x):
@@ -34,18 +27,6 @@ def test_multigrid_keeps_its_word_in_the_energy_norm(body, rtol):
     x = spsolve(A.tocsc(), b)
     error = energy(A, made("multigrid", args).solve(b, rtol) - x)
     assert error <= 2 * rtol * energy(A, x)
-
-
-@pytest.mark.parametrize("body", sorted({*BODIES} - {"fine punch"}))
-def test_the_v_cycle_is_symmetric_and_close_to_the_inverse(body):
-    solver, A = made("multigrid", BODIES[body]), BODIES[body].A.toarray()
-    B = np.stack([solver.cycle.apply(e) for e in np.eye(len(A))], axis=1)
-    scale = np.sqrt(np.diag(A))
-    scaled = B * scale * scale[:, None]
-    assert np.abs(scaled - scaled.T).max() <= 1e-5 * np.abs(scaled).max()  # single precision
-    L = np.linalg.cholesky(A)
-    values = np.linalg.eigvalsh(L.T @ (B + B.T) @ L / 2)  # those of B A
-    assert values.min() > 0.2 and values.max() < 1.1
 
 
 @pytest.mark.parametrize(
@@ -83,36 +64,6 @@ def test_iterations_do_not_depend_on_units_and_vanish_without_load():
     for x, cycles in answers[1:]:
         assert np.linalg.norm(x - answers[0][0]) <= 1e-7 * np.linalg.norm(answers[0][0])
         assert cycles == answers[0][1] > 0
-
-
-@pytest.mark.parametrize("form", ["csr", "bsr"])
-def test_threads_share_products_without_a_trace(form, monkeypatch):
-    """The product is the same to the last digit, and the pieces of the matrix are no copies."""
-    monkeypatch.setattr(products, "LARGE", 1)
-    A = BODIES["solid foundation"].A
-    n = A.shape[0] // 3 * 3
-    A = A[:n][:, :n] if form == "csr" else A[:n][:, :n].tobsr((3, 3))
-    x = np.random.default_rng(0).standard_normal(n)
-    shared = SparseProduct(A, Crew(3))
-    assert np.array_equal(shared @ x, SparseProduct(A) @ x)
-    assert all(np.shares_memory(A.data, piece.matrix.data) for piece in shared._pieces)
-    P = sp.random_array((n, 40), density=0.1, rng=np.random.default_rng(0)).toarray()
-    coarse = products.galerkin(sp.bsr_matrix(P, blocksize=(3, 5)), A.tobsr((3, 3)), Crew(3))
-    assert np.allclose(coarse.toarray(), P.T @ (A @ P), atol=1e-12 * abs(A).max())
-
-
-def test_a_block_is_the_matrix_without_the_other_rows():
-    """Multigrid for a Submatrix, which copies nothing, is multigrid for the rows and columns
-    themselves.
-    """
-    A, *rest = BODIES["solid punch"]
-    n = A.shape[0]
-    whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))
-    block = System(Submatrix(whole, np.arange(2, n + 2)), *rest)
-    b = np.random.default_rng(0).standard_normal(n)
-    assert np.array_equal(
-        made("multigrid", block).solve(b), made("multigrid", System(A, *rest)).solve(b)
-    )
 
 
 @pytest.mark.parametrize("degree", [1, 2])

@@ -1,6 +1,4 @@
-"""The rooms of the museum: what a page answers in the browser is what contactopt answers, every
-sentence that links to a room finds it, and a page can be read and used.
-"""
+"""The rooms of the museum: what a page answers in the browser is what contactopt answers."""
 
 import itertools
 import json
@@ -212,29 +210,19 @@ def blackboard(problem, g, r, v):
 @browser_needed
 def test_dual_gap(answered):
     G, x = string(4)
-    for p, a in answered("dual_gap"):
+    for number, (p, a) in enumerate(answered("dual_gap")):
         q = np.column_stack([0.02 - p["press"] * x * (1 - x), p["push"] * x])
         problem = InterfaceProblem(np.kron(G, coupled(p)), q, 1.0)
         r, v = np.reshape(a["r"], (4, 2)), np.reshape(a["v"], (4, 2))
         assert r[:, 0].min() >= 0 <= v[:, 0].min() and abs(r[:, 1]).max() <= p["g"]
-        w = (v - q).ravel()
-        energy = w @ np.linalg.solve(problem.Q, w) / 2
-        assert same(a["primal"], energy + p["g"] * abs(v[:, 1]).sum())
         exact, _ = TrescaProblem("proxqp", problem).solve(np.full(4, p["g"]), r)
         costs = [f.ravel() @ (problem.Q @ f.ravel() / 2 + q.ravel()) for f in (r, exact)]
         assert same(a["dual"], -costs[0]), p
         assert a["dual"] - SAME <= -costs[1] <= a["primal"] + SAME
         assert same(a["gap"], a["primal"] - a["dual"])
-
-
-@browser_needed
-def test_the_dual_gap_is_that_of_the_blackboard(answered):
-    G, x = string(4)
-    for p, a in answered("dual_gap")[:20]:
-        q = np.column_stack([0.02 - p["press"] * x * (1 - x), p["push"] * x])
-        problem = InterfaceProblem(np.kron(G, coupled(p)), q, 1.0)
-        dual, primal = blackboard(problem, p["g"], a["r"], a["v"])
-        assert same(-a["dual"], dual) and same(a["primal"], primal)
+        if number < 20:
+            dual, primal = blackboard(problem, p["g"], a["r"], a["v"])
+            assert same(-a["dual"], dual) and same(a["primal"], primal)
 
 
 def frictionless(Q, q):

@@ -1,7 +1,4 @@
-"""What the rooms of the museum say is true at every position of their sliders: at the ends, at
-zero, and where a theorem holds with equality. The answers come from linear programs, one for each
-combination of states, which know neither the pages nor contactopt's enumeration.
-"""
+"""What the rooms of the museum say is true at every position of their sliders."""
 
 import itertools
 import json
@@ -82,9 +79,7 @@ def said(museum, tmp_path):  # noqa: F811
 
 
 def solution_count(problem):
-    """How many forces solve a plane problem: a linear program for every combination of states, with
-    the forces and the rigid motions as unknowns. Pieces that touch share a point.
-    """
+    """How many forces solve a plane problem: a linear program for every combination of states."""
     Q, q, V, s = problem.Q, problem.q.ravel(), problem.V, problem.s
     mu, k, n = problem.law.coefficient, problem.contacts, problem.q.size
     whole, points = np.hstack([Q, V]), []

@@ -42,9 +42,7 @@ def test_the_peak_of_a_narrow_ellipse_is_as_uncertain_as_it_is_wrong(across, mos
 
 
 def test_rounding_does_not_choose_among_equal_peaks():
-    """A pressure that alternates between two values was read at an end of the line or inside, as
-    its values differed in their last digits, and so another unit of length gave another reading.
-    """
+    """A pressure that alternates was read at another place in another unit of length."""
     k, rng = 17, np.random.default_rng(0)
     places = np.arange(float(k))[None]
     kind = SimpleNamespace(kind="plane-strain", analysis=SimpleNamespace(revolved=False))

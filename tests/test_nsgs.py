@@ -1,5 +1,4 @@
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,6 @@ from contactopt.problem import natural_map_residual
 from contactopt.problem.laws.bilateral import Bilateral
 from contactopt.problem.laws.coulomb import Coulomb
 from contactopt.problem.laws.mixed import Mixed
-
-LIBRARY = Path(__file__).parents[2] / "shared" / "fclib"
 
 
 def law_violation(W, v, mu, r, bilateral):

@@ -44,9 +44,8 @@ def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
     # each frame is the image of the other, up to the sense of tangents where the scene was mirrored
     sense = np.einsum("kac,dc,kbd->kab", a.coupling.frames, R, b.coupling.frames[own])
     signs = np.einsum("kaa->ka", sense)
-    assert np.abs(sense - signs[:, :, None] * np.eye(dim)).max() < 1e-9 and np.allclose(
-        np.abs(signs), 1, atol=1e-9
-    )
+    assert np.abs(sense - signs[:, :, None] * np.eye(dim)).max() < 1e-9
+    assert np.allclose(np.abs(signs), 1, atol=1e-9)
     if np.linalg.det(R) > 0:
         assert np.allclose(signs, 1)
     flip, rows = np.sign(signs).ravel(), (dim * own[:, None] + np.arange(dim)).ravel()
@@ -65,10 +64,8 @@ def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
     if np.linalg.det(R) < 0 and p.chart.period is None:
         chart, other = np.abs(chart), np.abs(other)
     elif np.linalg.det(R) < 0:
-        chart, other = (
-            np.minimum(chart, p.chart.period - chart),
-            np.minimum(other, p.chart.period - other),
-        )
+        chart = np.minimum(chart, p.chart.period - chart)
+        other = np.minimum(other, p.chart.period - other)
     assert np.abs(chart - other).max() < 1e-9 * np.abs(chart).max()
     if np.linalg.det(R) > 0:
         # contacts are numbered along the surface, whatever way it lies
@@ -77,9 +74,7 @@ def test_a_turned_scene_has_the_same_interface_problem(plain, name, _, R):
 
 @pytest.mark.parametrize("clearance", [0.0, 0.5, 4.0])
 def test_a_pin_in_a_bush_is_coupled_along_the_radius(clearance):
-    """Concentric circles: the gap is the clearance everywhere, every partner lies on the same
-    radius.
-    """
+    """Concentric circles: the gap is the clearance, every partner lies on the same radius."""
     scene = turned.pin_in_bush(clearance=clearance)
     reduction = reduce_bodies(scene)
     assert np.allclose(reduction.coupling.gap, clearance, rtol=0.02, atol=1e-12)
@@ -97,8 +92,6 @@ def test_a_pin_in_a_bush_is_coupled_along_the_radius(clearance):
     U = np.zeros(len(body.load))
     U[body.unknowns[0]], U[body.unknowns[1]] = -body.locations[1], body.locations[0]
     u = (reduction.maps[0] @ U).reshape(-1, 2)
-    assert (
-        np.allclose(np.abs(u[:, 1]), 20 - clearance, rtol=1e-3)
-        and np.abs(u[:, 0]).max() < 0.05 * 20
-    )
+    assert np.allclose(np.abs(u[:, 1]), 20 - clearance, rtol=1e-3)
+    assert np.abs(u[:, 0]).max() < 0.05 * 20
     assert len(np.unique(np.sign(u[:, 1]))) == 1

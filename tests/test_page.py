@@ -1,6 +1,4 @@
-"""The page of a result: what is on it is what was computed, it stands alone, and a browser can use
-it.
-"""
+"""The page of a result: what is on it is what was computed, it stands alone."""
 
 import base64
 import gzip
@@ -97,8 +95,7 @@ def test_half_models_are_shown_whole(folder):
 
 
 def test_what_touches_is_drawn_touching(tmp_path):
-    """A press fit overlaps before it is loaded: with displacements magnified, the drawn surfaces
-    are apart by as many times the gap that there is, which is none where they touch."""
+    """With displacements magnified, drawn surfaces that touch have no gap."""
     result = run("press-fit", tmp_path, figures=(), html=True)
     data, s = data_of(tmp_path / "view.html"), 100.0
     (pair,) = result.scene.pairs
@@ -176,11 +173,8 @@ def test_names_reach_the_page_as_text_only(tmp_path):
     hostile = replace(base, name="</script><script>alert(1)</script>", units=("<b>", "<i>"))
     run(hostile, tmp_path, figures=(), html=True)
     text = (tmp_path / "view.html").read_text()
-    assert (
-        "<script>alert" not in text
-        and "<b>" not in text
-        and "</script><script>alert(1)" not in text
-    )
+    assert "<script>alert" not in text and "<b>" not in text
+    assert "</script><script>alert(1)" not in text
     assert data_of(tmp_path / "view.html")["units"] == ["<b>", "<i>", "<i> <b>^2"]
 
 
@@ -220,11 +214,8 @@ def damaged(data: bytes, way: str, rng: np.random.Generator) -> bytes:
 def test_damaged_results_become_a_page_or_one_sentence(folder, tmp_path, monkeypatch, capfd):
     """Files cut, flipped, swapped, missing, and values of other types, in all three runs."""
     monkeypatch.setattr("contactopt.figures.view_page.write_html", lambda *given: None)
-    rng, refused, ways = (
-        np.random.default_rng(2),
-        0,
-        ("cut", "flipped", "empty", "swapped", "missing", "type"),
-    )
+    rng, refused = np.random.default_rng(2), 0
+    ways = ("cut", "flipped", "empty", "swapped", "missing", "type")
     for number in range(54):
         run_folder = folder / ("flat", "solid", "path")[number % 3]
         work = tmp_path / str(number)
@@ -304,6 +295,10 @@ UNCUT = """(() => {
   };
   return words.every(inside) ? words.length : -1;
 })()"""
+CHANGE = (
+    "(() => {{ const c = document.getElementById('{}'); c.value = '{}';"
+    " c.dispatchEvent(new Event('{}')); }})()"
+)
 SAME = "painter.pixels.reduce((sum, pixel) => (31 * sum + pixel) | 0, 0)"
 
 
@@ -351,18 +346,14 @@ def exposed(folder):
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_the_slider_moves_the_bodies_and_any_column_of_the_history_is_drawn(folder):
-    change = (
-        "(() => {{ const c = document.getElementById('{}'); c.value = '{}';"
-        " c.dispatchEvent(new Event('{}')); }})()"
-    )
     with Browser(exposed(folder / "path"), 1000) as browser:
         browser.wait("performance.getEntriesByName('charted').length > 0")
         last = browser.ask(SAME)
-        browser.ask(change.format("state", 0, "input"))
+        browser.ask(CHANGE.format("state", 0, "input"))
         browser.wait(f"{SAME} !== {last}")
         words = browser.ask("document.getElementById('state-words').innerText")
         assert words.startswith("state 1 of ")
-        browser.ask(change.format("upward", "elastic_energy", "change"))
+        browser.ask(CHANGE.format("upward", "elastic_energy", "change"))
         # heights of the dots in the chart are linear in the column of the history
         dots = "[...document.querySelectorAll('#path-chart circle')]"
         drawn = np.array(browser.ask(f"{dots}.map((dot) => +dot.getAttribute('cy'))"))[
@@ -377,10 +368,6 @@ def test_the_slider_moves_the_bodies_and_any_column_of_the_history_is_drawn(fold
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_solids_are_cut_and_mirrored(folder):
-    change = (
-        "(() => {{ const c = document.getElementById('{}'); c.value = '{}';"
-        " c.dispatchEvent(new Event('{}')); }})()"
-    )
     with Browser(exposed(folder / "solid"), 1000) as browser:
         browser.wait("performance.getEntriesByName('drawn').length > 0")
         browser.press("b")
@@ -389,8 +376,8 @@ def test_solids_are_cut_and_mirrored(folder):
         assert browser.ask(SEEN)["share"] < 0.7 * whole  # a quarter of the bodies
         browser.ask("document.getElementById('whole').click()")
         assert browser.ask(SEEN)["share"] == pytest.approx(whole)
-        browser.ask(change.format("cut", 0, "change"))
-        browser.ask(change.format("cut-place", 0.5, "input"))
+        browser.ask(CHANGE.format("cut", 0, "change"))
+        browser.ask(CHANGE.format("cut-place", 0.5, "input"))
         browser.wait(f"{SEEN}.share < {0.95 * whole}")
         assert "from x = " in browser.ask("document.getElementById('cut-words').textContent")
         assert not browser.faults

@@ -61,8 +61,7 @@ def cubes(shapes: tuple[str, str], degree: int = 1, **contact) -> Scene:
 
 @pytest.mark.parametrize("law", ["coulomb", "tied", "frictionless"])
 @pytest.mark.parametrize(
-    "shapes",
-    [("mirrored", "tetrahedra"), ("tetrahedra", "hexahedra"), ("hexahedra", "tetrahedra")],
+    "shapes", [("mirrored", "tetrahedra"), ("tetrahedra", "hexahedra"), ("hexahedra", "tetrahedra")]
 )
 def test_nodes_that_match_without_their_facets_pass_a_constant_pressure_on(shapes, law):
     result = run(cubes(shapes, law=law), figures=())
@@ -175,9 +174,7 @@ def asked(scene, **options):
 @pytest.mark.parametrize("side", ["upper", "lower"])
 @pytest.mark.parametrize("wrong", ["lost", "twice", "moved"])
 def test_a_wrong_mortar_is_found(monkeypatch, degree, side, wrong):
-    """A tenth of the force of one contact inside the surface is lost, counted twice, or acts on
-    nodes next to those that it should act on.
-    """
+    """Force of one contact is lost, counted twice, or acts on nodes next to those it should."""
     made, surfaces = asked(cubes(("tetrahedra", "hexahedra"), degree, coupling="mortar"))
     assert misfit(made, surfaces) is None
     inner = int(np.argmin(np.linalg.norm(made.positions[:2] - 0.5, axis=0)))

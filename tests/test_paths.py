@@ -155,9 +155,8 @@ def test_gross_sliding_saturates_at_the_friction_bound():
     path = follow([dragged(d) for d in shifts])
     h = path.history
     assert path.solved
-    assert h["shear_force"][3] == pytest.approx(1.2, rel=1e-9) and h["shear_force"][
-        6
-    ] == pytest.approx(-1.2, rel=1e-9)
+    assert h["shear_force"][3] == pytest.approx(1.2, rel=1e-9)
+    assert h["shear_force"][6] == pytest.approx(-1.2, rel=1e-9)
     # mu N times the way
     assert h["friction_work"][3] - h["friction_work"][2] == pytest.approx(1.2 * 2.0, rel=1e-8)
     assert h["stick_nodes"][3] == 0 and h["slip_nodes"][3] == h["contact_nodes"][3] > 2
@@ -248,9 +247,7 @@ def test_a_state_that_nothing_can_hold_is_named():
 
 @pytest.mark.parametrize("kept", [True, False])
 def test_bodies_of_every_state_carry_its_own_loads(kept):
-    """A block that only the floor holds is pressed and pushed by tractions: its displacements at a
-    state are those of the path that ends there, whether the path kept them or finds them again.
-    """
+    """Displacements at a state are those of the path that ends there, kept or found again."""
 
     def pushed(x):
         block = replace(dragged(0.0).upper, supports=(), loads=(Traction("top", (x, -1.0)),))

@@ -15,9 +15,7 @@ EXACT = {
 
 
 def test_penetration_is_force_over_stiffness():
-    """One node held against a force of 1 with compliance 1: (1 + 1 / factor) r = 1, penetration r /
-    factor.
-    """
+    """(1 + 1 / factor) r = 1, penetration r / factor."""
     problem = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3)
     for factor in (10.0, 1e3):
         r = solve(problem, Penalty(factor)).reactions
@@ -89,12 +87,7 @@ def test_the_error_of_multipliers_falls_by_one_plus_rho_times_the_eigenvalue():
 
 
 @pytest.mark.parametrize(
-    "wrong",
-    [
-        lambda: Penalty(0.0),
-        lambda: Penalty(1e6, -1.0),
-        lambda: AugmentedLagrangian(np.nan),
-    ],
+    "wrong", [lambda: Penalty(0.0), lambda: Penalty(1e6, -1.0), lambda: AugmentedLagrangian(np.nan)]
 )
 def test_settings_without_sense(wrong):
     with pytest.raises(InputError):

@@ -1,6 +1,4 @@
-"""What is drawn of finite elements covers the body once, with all of its nodes, for every kind of
-element.
-"""
+"""What is drawn of finite elements covers the body once, with all of its nodes."""
 
 import numpy as np
 import pytest

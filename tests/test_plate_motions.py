@@ -1,7 +1,4 @@
-"""What is read off every named scene and load path, against the displacements of the nodes of its
-bodies: approach and shift are the motion of the nodes under the plates, and the resultants of pairs
-balance those of supports, plates and loads, with their moments.
-"""
+"""Readings of all scenes and paths, against the displacements of the nodes of their bodies."""
 
 from dataclasses import replace
 from functools import cache
@@ -211,9 +208,7 @@ def test_the_motion_of_a_held_washer_has_derivatives(quantity):
 
 @pytest.mark.parametrize("held", ["upper", "lower"])
 def test_neither_reading_changes_with_a_translation_of_the_scene(held):
-    """A bar pulled between two washers, of which both are pressed, or one is held, still or moved:
-    equilibrium makes all the same but for a translation, which adds to every displacement.
-    """
+    """A bar between two washers: equilibrium makes all the same but for a translation."""
 
     def scene(support, moved=0.0):
         def part(name, low, high, supports=(), **force):

@@ -213,9 +213,7 @@ def test_named_scenes_get_no_sentence(name):
 
 
 def test_an_impossible_strain_is_refused_and_not_noted():
-    """A block that is held overlaps the floor by nearly its height, or a load is meant for another
-    unit. A strain of a tenth is noted, and one of order one by the first of all remarks.
-    """
+    """A strain of a tenth is noted, and one of order one by the first of all remarks."""
     block_ = block((0, 10), (0, 10))
     for overlap, load, refused in (
         (9.5, 0, True),

@@ -135,9 +135,7 @@ def test_triangles_are_drawn():
 
 
 def test_nearer_bodies_hide_those_behind_them_in_every_pixel():
-    """Two triangles that pierce each other, and a small one before a large one whose middle is
-    nearer to the eye.
-    """
+    """Two triangles that pierce each other, and a small one before a large one."""
     big = np.array([[0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.0, 40.0, 0.0]])
     # nearer beyond half of its width
     tilted = big + np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])

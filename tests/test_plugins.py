@@ -1,6 +1,4 @@
-"""Adding a plug-in costs one file and one line: each example of the page is added to a copy of the
-package and used by its name.
-"""
+"""Each example of the page of plug-ins is added to a copy of the package and used."""
 
 import json
 import re
@@ -62,9 +60,7 @@ def insert(text: str, at: int, lines: str) -> str:
 
 
 def add(kind: Kind, package: Path) -> tuple[list[Path], dict[Path, int]]:
-    """Add the plug-in to the package as its section says; the files that are new, and lines added
-    to the others.
-    """
+    """Add the plug-in to the package as its section says; the files that are new."""
     new, changed = [], {}
     for head, code in blocks(kind.section).items():
         where = re.search(r"(contactopt/\S+\.py)$", head)

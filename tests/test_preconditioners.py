@@ -5,20 +5,11 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, cg
+from scipy.sparse.linalg import LinearOperator
+from turned import renumbered
 
-from contactopt import (
-    InputError,
-    InterfaceProblem,
-    Material,
-    Part,
-    Scene,
-    Support,
-    reduce,
-    scenes,
-)
+from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce, scenes
 from contactopt.meshes.structured import graded, rename, tensor_mesh
-from contactopt.methods.kernels.krylov import model_of
 from contactopt.methods.preconditioners import (
     PRECONDITIONERS,
     deflated,
@@ -26,10 +17,7 @@ from contactopt.methods.preconditioners import (
     restricted,
     smooth_motions,
 )
-from contactopt.methods.preconditioners.circulant import (
-    norm,
-    seminorm,
-)
+from contactopt.methods.preconditioners.circulant import norm, seminorm
 from contactopt.problem.chart import Chart
 
 SIZES = (17, 33, 65)  # contacts
@@ -40,9 +28,7 @@ ON_GRIDS = [name for name in PRECONDITIONERS if name != "laplacian"]
 
 @cache
 def blocks(k: int, upper: float, lower: float, nu: float) -> InterfaceProblem:
-    """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below; k nodes on the
-    contact line.
-    """
+    """A punch 4 wide and high, held on top, on a foundation 16 x 8, clamped below."""
     zone = np.linspace(-2, 2, k)
     h = zone[1] - zone[0]
     punch = rename(tensor_mesh(zone, graded(4, h, 1.15)), contact="y-", top="y+")
@@ -93,9 +79,7 @@ def normal_block(problem: InterfaceProblem, name: str) -> tuple[np.ndarray, np.n
 
 @pytest.mark.parametrize("k", SIZES)
 def test_condition_numbers_of_the_papers_preconditioners(k):
-    """Against the matrices of eqs (25) and (26) written down densely; both improve on Q, more so
-    the more contacts.
-    """
+    """Against the matrices of eqs (25) and (26) written down densely."""
     problem, m = blocks(k, 5.0, 5.0, 0.3), int(2 ** np.ceil(np.log2(k)))
     Q = problem.Q[::2, ::2]
     first = la.circulant(seminorm(m))[:k, :k]
@@ -121,16 +105,6 @@ def test_full_operator_with_four_motions_deflated(upper, lower, bound):
         assert condition(P, problem.Q) < bound
 
 
-def test_pcg_iterations_do_not_grow():
-    for k in (17, 129):
-        problem = blocks(k, 5.0, 5.0, 0.3)
-        P = deflated(preconditioner(problem, "neumann"), problem.Q, smooth_motions(problem))
-        load, steps = np.random.default_rng(0).normal(size=2 * k), []
-        x, failed = cg(problem.Q, load, rtol=1e-8, M=P, callback=steps.append)
-        assert not failed and len(steps) <= 15
-        assert np.linalg.norm(problem.Q @ x - load) <= 1.1e-8 * np.linalg.norm(load)
-
-
 @pytest.mark.parametrize("name", ON_GRIDS)
 def test_they_are_symmetric_positive_definite_and_blind_to_order_and_units(name):
     problem = blocks(17, 5.0, 5.0, 0.3)
@@ -138,23 +112,10 @@ def test_they_are_symmetric_positive_definite_and_blind_to_order_and_units(name)
     assert np.allclose(P, P.T, atol=1e-9 * np.abs(P).max()) and la.eigvalsh((P + P.T) / 2)[0] > 0
     order = np.random.default_rng(0).permutation(17)
     rows = (2 * order[:, None] + np.arange(2)).ravel()
-    mixed = InterfaceProblem(
-        problem.Q[np.ix_(rows, rows)],
-        problem.q[order],
-        0.5,
-        areas=1e6 * problem.areas[order],
-        coordinates=1e3 * problem.coordinates[:, order],
-    )
+    mixed = renumbered(problem, order, unit=1e3)
     assert np.allclose(
         preconditioner(mixed, name) @ np.eye(34), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max()
     )
-
-
-def test_deflation_is_exact_on_the_deflated_motions():
-    problem = blocks(17, 5.0, 5.0, 0.3)
-    Z = smooth_motions(problem)
-    P = deflated(preconditioner(problem, "p21"), problem.Q, Z)
-    assert np.allclose(P @ (problem.Q @ Z), Z, atol=1e-10)
 
 
 def test_bad_input():
@@ -183,15 +144,6 @@ def test_in_3d(n):
     bare = np.linalg.cond(problem.Q)
     assert condition(first @ np.eye(size), problem.Q) < 0.6 * bare
     assert condition(deflated(second, problem.Q, smooth_motions(problem)), problem.Q) < 6
-
-
-@pytest.mark.parametrize("make", [lambda: blocks(17, 5.0, 5.0, 0.3), lambda: solids(5, 5.0, 50.0)])
-def test_the_model_is_the_inverse_deflated_or_not(make):
-    problem = make()
-    P = preconditioner(problem, "neumann")
-    for operator in (P, deflated(P, problem.Q, smooth_motions(problem))):
-        both = np.stack([operator.model @ (operator @ x) for x in np.eye(problem.q.size)])
-        assert np.allclose(both, np.eye(problem.q.size), atol=1e-9)
 
 
 @pytest.mark.parametrize("make", [lambda: blocks(33, 5.0, 5e4, 0.3), lambda: solids(7, 5.0, 5.0)])
@@ -251,13 +203,8 @@ def test_a_closed_line_may_be_numbered_from_anywhere(name):
     order = np.random.default_rng(0).permutation(33)
     rows = (2 * order[:, None] + np.arange(2)).ravel()
     place = (problem.chart.places[0, order] + 1.0) % (2 * np.pi)
-    mixed = replace(
-        problem,
-        Q=problem.Q[np.ix_(rows, rows)],
-        areas=problem.areas[order],
-        coordinates=place[None],
-        chart=Chart(place[None], (False,), 2 * np.pi),
-    )
+    chart = Chart(place[None], (False,), 2 * np.pi)
+    mixed = replace(renumbered(problem, order), coordinates=place[None], chart=chart)
     P = preconditioner(problem, name) @ np.eye(66)
     assert np.allclose(
         preconditioner(mixed, name) @ np.eye(66), P[np.ix_(rows, rows)], atol=1e-9 * np.abs(P).max()
@@ -277,15 +224,4 @@ def test_a_grid_may_lie_at_any_angle_in_its_chart(name, degrees):
     expected = turn @ P @ turn.T
     assert np.allclose(
         preconditioner(moved, name) @ np.eye(len(Q)), expected, atol=1e-8 * np.abs(P).max()
-    )
-
-
-def test_going_on_without_a_preconditioner_is_said(caplog):
-    ragged = InterfaceProblem(
-        np.eye(9), np.zeros((3, 3)), 0.1, coordinates=np.array([[0.0, 1, 2], [0, 1, 3]])
-    )
-    with caplog.at_level("INFO", logger="contactopt"):
-        P = model_of(ragged)
-    assert "no preconditioner fits these contacts" in caplog.text and np.array_equal(
-        P @ np.arange(9.0), np.arange(9.0)
     )

@@ -1,6 +1,4 @@
-"""The page of the programs of friction runs, shows every program of contactopt.models with a
-picture and three solvers, and is one click from the first page.
-"""
+"""The page of the programs of friction runs and shows every program of contactopt.models."""
 
 import re
 from pathlib import Path

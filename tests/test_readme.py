@@ -35,9 +35,7 @@ def test_files_that_are_linked_exist():
 
 
 def test_commands_are_commands():
-    """Those of contactopt are read by its own parser, the files and modules that the others name
-    exist.
-    """
+    """Those of contactopt are read by its own parser; files and modules of the others exist."""
     shell = "\n".join(re.findall(r"```sh\n(.*?)```", README, re.S))
     for line in re.findall(r"bin/contactopt (.*)$", shell, re.M):
         make_parser().parse_args(line.split())

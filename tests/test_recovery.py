@@ -1,6 +1,4 @@
-"""Stress at a place: the fit is exact for polynomials, better than averages, and its load is its
-transpose.
-"""
+"""Stress at a place: the fit is exact for polynomials, better than averages."""
 
 import numpy as np
 import pytest
@@ -73,9 +71,7 @@ def test_a_stress_that_the_displacement_can_have_is_recovered_everywhere(shape, 
 
 @pytest.mark.parametrize("degree", [1, 2])
 def test_the_recovered_stress_converges_faster_than_averages(degree):
-    """At the surface, where averages look from one side: the worst vertex of a smooth field on two
-    meshes.
-    """
+    """At the surface, where averages look from one side."""
     errors = {"fit": [], "average": []}
     for count in (6, 12):
         ticks = np.linspace(0, 1, count + 1)
@@ -101,10 +97,8 @@ def test_the_load_is_the_transpose_of_the_recovery(kind):
     random = np.random.default_rng(1)
     body = assembled(MESHES["tetrahedra" if kind == "solid" else "triangles"], 1, kind)
     found = stress_map(body, Region("top"))
-    U, slopes = (
-        random.standard_normal(body.basis.N),
-        random.standard_normal((len(found.sources), len(KINDS[kind].stresses))),
-    )
+    U = random.standard_normal(body.basis.N)
+    slopes = random.standard_normal((len(found.sources), len(KINDS[kind].stresses)))
     assert np.sum(found.stress(U) * slopes) == pytest.approx(found.transposed(slopes) @ U)
     stress = random.standard_normal((5, len(KINDS[kind].stresses)))
     change = random.standard_normal(stress.shape)
@@ -143,9 +137,7 @@ def test_names_of_other_quantities_are_not_places():
 
 
 def test_the_pressure_under_a_flat_punch_is_read_between_its_nodes():
-    """Against the exact pressure of a rigid flat punch without friction on a half-plane, P / (pi
-    sqrt(a^2 - x^2)).
-    """
+    """Against the exact pressure of a rigid flat punch without friction on a half-plane."""
     scene = scenes.flat_punch(
         2, mu=0.0, elements=32, rigid="punch", foundation_width=1600.0, foundation_height=800.0
     )
@@ -159,9 +151,7 @@ def test_the_pressure_under_a_flat_punch_is_read_between_its_nodes():
 
 
 def test_the_largest_stress_under_a_line_contact_is_where_it_should_be():
-    """Under Hertz's line contact without friction: .558 of the peak pressure, .704 half-widths
-    deep, for nu = .3.
-    """
+    """Without friction: .558 of the peak pressure, .704 half-widths deep, for nu = .3."""
     scene = make_scene("cylinder-2d", mu=0.0, elements=16)
     solved = solve_scene(scene)
     body = scene.parts[-1].name
@@ -172,15 +162,12 @@ def test_the_largest_stress_under_a_line_contact_is_where_it_should_be():
     )
     a, peak = scene.reference.half_width, scene.reference.peak
     assert found.value == pytest.approx(0.558 * peak, rel=0.02)
-    assert abs(found.peaks[0].place[0]) < 0.1 * a and abs(found.peaks[0].place[1]) == pytest.approx(
-        0.704 * a, rel=0.15
-    )
+    assert abs(found.peaks[0].place[0]) < 0.1 * a
+    assert abs(found.peaks[0].place[1]) == pytest.approx(0.704 * a, rel=0.15)
 
 
 def test_the_scatter_of_the_elements_is_the_uncertainty_of_the_fit():
-    """No scatter, no uncertainty; and the fits of noise of known size deviate by as much as they
-    say, on average.
-    """
+    """The fits of noise of known size deviate by as much as they say, on average."""
     random = np.random.default_rng(2)
     body = assembled(skfem.MeshTri.init_tensor(np.linspace(0, 1, 13), np.linspace(0, 1, 13)))
     found = stress_map(body, Region())

@@ -52,9 +52,7 @@ def test_recovered_bodies_are_in_equilibrium_and_meet_the_interface_equation(sce
 
 
 def test_a_plate_that_a_support_resists_is_condensed():
-    """No multiplier is left, the problem is linear in the force, and the plate only redistributes
-    it.
-    """
+    """No multiplier is left, the problem is linear in the force."""
     base = two_blocks("plane-strain", mu=0.4)
     mesh = base.upper.mesh.with_boundaries({"grip": lambda x: (x[0] == 0) & (x[1] < 0.4)})
     held = replace(base.upper, mesh=mesh, supports=(Support("grip"),))
@@ -119,9 +117,7 @@ def test_two_rigid_bodies_are_refused():
 
 
 def test_a_plate_that_moves_along_the_contact():
-    """Two multipliers, pressed and dragged: sticks below the friction limit, and the shift is an
-    output.
-    """
+    """Pressed and dragged, it sticks below the friction limit, and the shift is an output."""
     mesh = block("plane-strain", 0, 1)
     upper = Part("u", mesh, MATERIAL, (), (Plate("top", {"x": 0.5, "y": -3.0}),), contact="bottom")
     lower = Part("l", block("plane-strain", -2, 0), MATERIAL, (Support("bottom"),), contact="top")

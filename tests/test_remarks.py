@@ -1,6 +1,4 @@
-"""Every remark that the package makes reaches the reader: the summary, the command line, pages and
-notebooks. The places that make one are found in the code, so that a new one is tested, too.
-"""
+"""Every remark that the package makes reaches the reader."""
 
 import ast
 import importlib
@@ -37,9 +35,7 @@ def calls():
 
 
 def speaking():
-    """(module, name of its logger) of every module that warns in a run, and every module that makes
-    a note.
-    """
+    """(module, name of its logger) of every module that warns in a run."""
     warned, noted = set(), set()
     for room, module, call in calls():
         by = call.func
@@ -73,9 +69,7 @@ def test_nothing_speaks_past_the_log():
 
 
 def test_warnings_and_notes_of_all_modules_reach_the_reader(tmp_path, capsys, monkeypatch):
-    """Each module that warns does so while the scene is posed, by its own logger; each that makes
-    notes does so while the problem is solved, by the function that it calls.
-    """
+    """Modules that warn do so while the scene is posed; those that note, while it is solved."""
     warned, noted = speaking()
     assert len(warned) > 3 and len(noted) > 8
     whole, follow = posing.assemble, driver._follow
@@ -131,9 +125,8 @@ def test_a_quiet_run_keeps_its_remarks(verbose, tmp_path, capsys, monkeypatch):
     line = ["run", "punch-2d", "--elements", "2", "--no-figures", "--out", str(out)]
     main([*line[:1], *verbose, *line[1:]])
     printed = capsys.readouterr()
-    assert re.search("^note 1 +heard$", printed.out, re.M) and ("heard" in printed.err) == (
-        verbose != ["-q"]
-    )
+    assert re.search("^note 1 +heard$", printed.out, re.M)
+    assert ("heard" in printed.err) == (verbose != ["-q"])
     assert "heard" in json.loads((out / "summary.json").read_text())["remarks"]
 
 

@@ -1,6 +1,4 @@
-"""A stopped run goes on, and a finished one is the start of another; whatever the start, the answer
-is the certified one of the scene as it is.
-"""
+"""A stopped run goes on, and a finished one is a start; the answer is the certified one."""
 
 import json
 

@@ -10,35 +10,11 @@ from contactopt import InputError, Material, Part, Plate, Rigid, Scene, cli, run
 from contactopt.readings.quantities import value_of
 
 KEYS = [
-    "scene",
-    "kind",
-    "units",
-    "thickness",
-    "mirrors",
-    "dofs",
-    "contact_nodes",
-    "mu",
-    "method",
-    "normal_backend",
-    "tangential_backend",
-    "status",
-    "message",
-    "residual",
-    "outer_iterations",
-    "normal_force",
-    "approach",
-    "contact_half_width",
-    "stick_half_width",
-    "max_pressure",
-    "pressure",
-    "q",
-    "products",
-    "remarks",
-    "pairs",
-    "holders",
-    "limits",
-    "seconds",
-]
+    "scene", "kind", "units", "thickness", "mirrors", "dofs", "contact_nodes", "mu", "method",
+    "normal_backend", "tangential_backend", "status", "message", "residual", "outer_iterations",
+    "normal_force", "approach", "contact_half_width", "stick_half_width", "max_pressure",
+    "pressure", "q", "products", "remarks", "pairs", "holders", "limits", "seconds",
+]  # fmt: skip
 
 
 def check_tables(result, out):
@@ -136,26 +112,18 @@ def test_list(capsys):
         assert word in text
 
 
-@pytest.mark.parametrize(
-    "arguments,words",
-    [
-        (["nowhere"], "unknown scene 'nowhere'; choose from punch-2d, punch-3d, sphere"),
-        (
-            ["punch-2d", "--normal", "simplex"],
-            "unknown qp backend 'simplex'; choose from clarabel",
-        ),
-        (
-            ["punch-3d", "--tangential", "proxqp"],
-            "unknown conic backend 'proxqp'; choose from clarabel",
-        ),
-        (["punch-2d", "--method", "magic"], "unknown method 'magic'; choose from auto"),
-        (["punch-2d", "--mu", "-1"], "mu must be a finite number at least 0"),
-        (["punch-2d", "--mu", "nan"], "mu must be a finite number"),
-        (["punch-2d", "--elements", "0"], "elements must be a whole number"),
-        (["punch-2d", "--tol", "0"], "tol must be a finite number"),
-        (["sphere", "--force", "1e9"], "too much for a sphere"),
-    ],
-)
+@pytest.mark.parametrize("arguments,words", [
+    (["nowhere"], "unknown scene 'nowhere'; choose from punch-2d, punch-3d, sphere"),
+    (["punch-2d", "--normal", "simplex"], "unknown qp backend 'simplex'; choose from clarabel"),
+    (["punch-3d", "--tangential", "proxqp"],
+     "unknown conic backend 'proxqp'; choose from clarabel"),
+    (["punch-2d", "--method", "magic"], "unknown method 'magic'; choose from auto"),
+    (["punch-2d", "--mu", "-1"], "mu must be a finite number at least 0"),
+    (["punch-2d", "--mu", "nan"], "mu must be a finite number"),
+    (["punch-2d", "--elements", "0"], "elements must be a whole number"),
+    (["punch-2d", "--tol", "0"], "tol must be a finite number"),
+    (["sphere", "--force", "1e9"], "too much for a sphere"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence_and_writes_nothing(arguments, words, tmp_path, capsys):
     out = tmp_path / "out"
     assert cli.main(["run", *arguments, "--out", str(out)]) == 2
@@ -228,9 +196,5 @@ def test_a_contact_that_the_mesh_cannot_show_is_remarked_on():
     )
     floor = Rigid("floor", normal=(0.0, 1.0), gap=lambda x: 40.0 * (x[0] - 0.5) ** 2)
     told = run(Scene("block on a ridge", block, floor, mu=0.4)).summary["remarks"]
-    assert (
-        len(told) == 2
-        and "strain of up to" in told[1]
-        and "1 of 9" in told[0]
-        and "block-floor" in told[0]
-    )
+    assert len(told) == 2 and "strain of up to" in told[1] and "1 of 9" in told[0]
+    assert "block-floor" in told[0]

@@ -1,6 +1,4 @@
-"""Half-spaces, materials, load steps and changed entries of scene files, and their JSON schema,
-against the same scenes in Python.
-"""
+"""Half-spaces, materials, load steps and changed entries of scene files."""
 
 import json
 import re
@@ -144,10 +142,8 @@ def test_steps_have_names_and_grow_from_the_step_before(tmp_path):
     assert [f["x"] for f in forces] == pytest.approx([0, 0, 1, 2, 3])
     contactopt.run(file, tmp_path / "out", figures=())
     head, *rows = (tmp_path / "out" / "history.csv").read_text().splitlines()
-    assert (
-        head.endswith(",step")
-        and [row.split(",")[-1] for row in rows] == ["press"] * 2 + ["push"] * 3
-    )
+    assert head.endswith(",step")
+    assert [row.split(",")[-1] for row in rows] == ["press"] * 2 + ["push"] * 3
     named = read_scene_file(written(tmp_path, 'steps = ["press", "push"]\n' + steps)).states
     assert [state.bodies[0].loads[0].force["x"] for state in named] == [0.0, 3.0]
     for wrong, said in (

@@ -112,17 +112,7 @@ def test_every_entry_reaches_the_scene(tmp_path):
         tmp_path / "disc.vtu",
         meshio.Mesh(
             np.pad(plane.p.T, [(0, 0), (0, 1)]),
-            [
-                (
-                    "triangle6",
-                    skfem.io.meshio.to_meshio(
-                        plane,
-                        encode_cell_data=False,
-                    )
-                    .cells[0]
-                    .data,
-                )
-            ],
+            [("triangle6", skfem.io.meshio.to_meshio(plane, encode_cell_data=False).cells[0].data)],
             cell_data={"part": [np.ones(plane.nelements, int)]},
         ),
     )
@@ -179,15 +169,11 @@ Q = "explicit"
     assert first.bodies[0].loads[0].value == (0.0, 1.0) and first.bodies[2].force == {"y": -1.0}
     np.testing.assert_allclose(disc.curve(np.array([[3.0], [6.0]])), [[6.0], [2.0]])
     assert set(ring.mesh.boundaries) == {"inner", "outer"} and ring.mesh.nelements == 24
-    assert punch.normal == (0.0, 1.0) and punch.gap(np.array([[2.0], [0.0]])) == pytest.approx(
-        [0.2]
-    )
+    assert punch.normal == (0.0, 1.0)
+    assert punch.gap(np.array([[2.0], [0.0]])) == pytest.approx([0.2])
     pair = last.contacts[0]
-    assert isinstance(pair, Contact) and (pair.law, pair.coupling, pair.carrier) == (
-        "tresca",
-        "mortar",
-        "upper",
-    )
+    assert isinstance(pair, Contact)
+    assert (pair.law, pair.coupling, pair.carrier) == ("tresca", "mortar", "upper")
     np.testing.assert_allclose(pair.mu(np.array([[0.0, 5.0], [1.0, 1.0]])), [0.1, 0.15])
 
 
@@ -215,12 +201,8 @@ def test_blocks_in_other_kinds(tmp_path, kind, components):
 
 
 MISTAKES = [
-    (
-        'kind = "plane-strain"',
-        'kind = "plane-shear"',
-        1,
-        "there is no kind 'plane-shear'; choose from plane-strain",
-    ),
+    ('kind = "plane-strain"', 'kind = "plane-shear"', 1,
+     "there is no kind 'plane-shear'; choose from plane-strain"),
     ("thickness = 2.0", "thicknes = 2.0", 2, "there is no 'thicknes'; valid names are .*thickness"),
     ("thickness = 2.0", 'thickness = "2"', 2, "'thickness' must be a number"),
     ("thickness = 2.0", "thickness = -2.0", 2, "thickness must be a finite number greater than 0"),
@@ -231,21 +213,13 @@ MISTAKES = [
     ("thickness = 2.0", "units = { length = 3 }", 2, "'length' must be a text"),
     ("block = { x = [0, 2], y", "block = { x = [2, 0], y", 5, "'x' must ascend"),
     ("block = { x = [0, 2], y", "block = { x = [2], y", 5, "two coordinates, .*got \\[2"),
-    (
-        "block = { x = [0, 2], y",
-        "block = { z = [0, 2], y",
-        5,
-        "'x' is missing in bodies.block.block",
-    ),
+    ("block = { x = [0, 2], y", "block = { z = [0, 2], y", 5,
+     "'x' is missing in bodies.block.block"),
     ("elements = [4, 2]", "elements = [4, 0]", 5, "'elements' must be whole numbers"),
     ("elements = [4, 2]", "elements = [4000000, 4000000]", 5, "elements in all"),
     ("block = { x", 'mesh = "a.msh"\nblock = { x', 4, "exactly one of .* has mesh and block"),
-    (
-        "block = { x = [0, 2], y = [0, 1], elements = [4, 2] }",
-        'mesh = "a.msh"',
-        5,
-        "mesh file .*a.msh' does not exist",
-    ),
+    ("block = { x = [0, 2], y = [0, 1], elements = [4, 2] }", 'mesh = "a.msh"', 5,
+     "mesh file .*a.msh' does not exist"),
     ("block = { x = [0, 2], y = [0, 1], elements = [4, 2] }", "", 4, "exactly one of .* has none"),
     ("E = 5.0, nu", "E = -5.0, nu", 6, "Young's modulus"),
     ("nu = 0.3", "nu = 0.5", 6, "Poisson's ratio"),
@@ -257,37 +231,21 @@ MISTAKES = [
     ('boundary = "y+",', "", 9, r"'boundary' is missing in bodies.block.plates\[1\]"),
     ("x = 1.0, y", "z = 1.0, y", 9, "no 'z' in .*force; valid names are x, y"),
     ("x = 1.0, y", "x = nan, y", 9, "x must be a finite number"),
-    (
-        "x = 1.0, y = -10.0",
-        "x = [1, 2], y = [3, 4, 5]",
-        9,
-        "'x' has values for 2 states, other.* 3",
-    ),
+    ("x = 1.0, y = -10.0", "x = [1, 2], y = [3, 4, 5]", 9,
+     "'x' has values for 2 states, other.* 3"),
     ("x = 1.0, y", "x = [], y", 9, "empty array"),
     ("force = { x = 1.0, y = -10.0 }", "glued = 1", 9, "a plate needs force"),
     ("rigid = {}", "rigid = { normal = { x = 0 } }", 13, "the normal is zero"),
-    (
-        "rigid = {}",
-        "rigid = { normal = { y = 1, z = 1 } }",
-        13,
-        "no 'z' in .*normal; valid names are x, y",
-    ),
+    ("rigid = {}", "rigid = { normal = { y = 1, z = 1 } }", 13,
+     "no 'z' in .*normal; valid names are x, y"),
     ("tol = 1e-10", "tolerance = 1e-10", 21, "no 'tolerance' in solve; valid names are method"),
     ("[solve]", "[slove]", 20, "there is no 'slove'; .*did you mean 'solve'"),
     ("rigid = {}", 'rigid = { gap = "x +" }', 13, "cannot be computed"),
     ("[[contacts]]", "[contacts]", 15, "'contacts' must be an array of tables"),
-    (
-        'upper = "block"',
-        'upper = "blok"',
-        16,
-        "there is no body 'blok'; the bodies are block, floor",
-    ),
-    (
-        'upper = "block"',
-        'upper = "block:top"',
-        16,
-        "no boundary 'top'; name its surface as 'block:NAME'",
-    ),
+    ('upper = "block"', 'upper = "blok"', 16,
+     "there is no body 'blok'; the bodies are block, floor"),
+    ('upper = "block"', 'upper = "block:top"', 16,
+     "no boundary 'top'; name its surface as 'block:NAME'"),
     ('lower = "floor"', 'lower = "block"', 15, "'block' cannot touch itself"),
     ("mu = 0.4", "mu = -0.4", 15, "friction coefficient mu"),
     ("mu = 0.4", "", 15, "'mu' is missing in contacts"),
@@ -298,12 +256,8 @@ MISTAKES = [
     ("tol = 1e-10", "read = [1]", 21, "'read' must be an array of names"),
     ("tol = 1e-10", 'read = ["displacement:block:z+"]', 21, "no boundary 'z\\+'; it has x"),
     ("thickness = 2.0", "degree = 3", 2, "degree must be 1 or 2"),
-    (
-        'contact = "y-"',
-        'contact = "y-"\nsupports = [{ boundary = "x-" }]',
-        4,
-        "body 'block': the plate 'y\\+' moves",
-    ),
+    ('contact = "y-"', 'contact = "y-"\nsupports = [{ boundary = "x-" }]', 4,
+     "body 'block': the plate 'y\\+' moves"),
     ("block = { x = [0, 2], y", "move = { x = 1e16 }\nblock = { x = [0, 2], y", 5, "moved so far"),
     ("[solve]", "[solv]", 20, "there is no 'solv'"),
     ("mu = 0.4", "mu = [0.3, 0.2]", 15, "'block-floor': .* one number or one per contact"),
@@ -311,7 +265,7 @@ MISTAKES = [
     ("tol = 1e-10", 'method = "newtn"', 21, "unknown method 'newtn'"),
     ("thickness = 2.0", 'units = { length = "mm", stress = "mpa" }', 2, "did you mean 'MPa'"),
     ("thickness = 2.0", 'steps = ["press", "press"]', 2, "a name of its own; got 'press'"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("right,wrong,line,message", MISTAKES, ids=[m[1][:30] for m in MISTAKES])

@@ -143,61 +143,45 @@ def test_sheared_sphere_is_cattaneos():
 
 def test_paths_are_states_of_one_scene():
     cycle = make_path("cattaneo-2d", steps=2, shear=20.0, elements=4)
-    assert [s.upper.loads[0].force["x"] for s in cycle] == [
-        0,
-        10,
-        20,
-        10,
-        0,
-        -10,
-        -20,
-        -10,
-        0,
-        10,
-        20,
-    ]
+    shears = [s.upper.loads[0].force["x"] for s in cycle]
+    assert shears == [0, 10, 20, 10, 0, -10, -20, -10, 0, 10, 20]
     assert all(s.upper.loads[0].force["y"] == -100.0 for s in cycle)
     growing = make_path("hertz-dissimilar", steps=4, force=64.0, elements=4)
     assert [-s.upper.force["z"] for s in growing] == [1.0, 8.0, 27.0, 64.0]
     assert len({s.zone for s in growing}) == 1
 
 
-@pytest.mark.parametrize(
-    "make,message",
-    [
-        (lambda: make_path("punch-2d"), "has no load path; choose from"),
-        (lambda: make_path("cattaneo-2d", steps=0), "steps must be a whole number"),
-        (lambda: make_path("cattaneo-2d", stops=3), "stops"),
-        (lambda: scenes.cattaneo(4), "dim must be 2 or 3"),
-        (lambda: scenes.cattaneo(2, shear=50.0), "the bodies slide off"),
-        (lambda: scenes.cattaneo(2, mu=0.0), "the bodies slide off"),
-        (lambda: scenes.cattaneo(2, force=1e9), "too much for bodies|larger bodies"),
-        (lambda: scenes.rigid_punch("solid"), "kind must be .plane-strain. or .axisymmetric."),
-        (lambda: scenes.rigid_punch(foundation=30.0), "at least two half-widths"),
-        (lambda: scenes.indentation(foundation=3.0), "at least two contact radii"),
-        (lambda: scenes.cylinder(rigid="sphere"), "rigid must be None, 'cylinder' or 'foundation'"),
-        (lambda: scenes.cylinder(force=1e9), "too much for a cylinder"),
-        (lambda: scenes.cylinder(depth=0.0), "depth"),
-        (lambda: make_scene("punch-4d"), "unknown scene 'punch-4d'; choose from punch-2d"),
-        (lambda: make_scene("sphere", depth=3), "depth"),
-        (lambda: scenes.flat_punch(4), "dim must be 2 or 3"),
-        (
-            lambda: scenes.flat_punch(2, mu=-0.1),
-            "friction coefficient mu must be a finite number at least 0",
-        ),
-        (lambda: scenes.flat_punch(2, mu=np.nan), "mu must be a finite number"),
-        (lambda: scenes.flat_punch(2, force=-1), "force must be a finite number greater than 0"),
-        (lambda: scenes.flat_punch(2, width=0), "width"),
-        (lambda: scenes.flat_punch(2, foundation_width=10), "at least as wide as the punch"),
-        (lambda: scenes.flat_punch(2, elements=0), "whole number"),
-        (lambda: scenes.flat_punch(2, elements=2.5), "whole number"),
-        (lambda: scenes.flat_punch(2, rigid="both"), "rigid must be"),
-        (lambda: scenes.sphere(force=1e9), "too much for a sphere"),
-        (lambda: scenes.sphere(rigid="punch"), "rigid must be"),
-        (lambda: scenes.sphere(radius=np.inf), "radius"),
-        (lambda: scenes.flat_punch(2, upper=Material(-5, 0.3)), "Young's modulus E"),
-    ],
-)
+@pytest.mark.parametrize("make,message", [
+    (lambda: make_path("punch-2d"), "has no load path; choose from"),
+    (lambda: make_path("cattaneo-2d", steps=0), "steps must be a whole number"),
+    (lambda: make_path("cattaneo-2d", stops=3), "stops"),
+    (lambda: scenes.cattaneo(4), "dim must be 2 or 3"),
+    (lambda: scenes.cattaneo(2, shear=50.0), "the bodies slide off"),
+    (lambda: scenes.cattaneo(2, mu=0.0), "the bodies slide off"),
+    (lambda: scenes.cattaneo(2, force=1e9), "too much for bodies|larger bodies"),
+    (lambda: scenes.rigid_punch("solid"), "kind must be .plane-strain. or .axisymmetric."),
+    (lambda: scenes.rigid_punch(foundation=30.0), "at least two half-widths"),
+    (lambda: scenes.indentation(foundation=3.0), "at least two contact radii"),
+    (lambda: scenes.cylinder(rigid="sphere"), "rigid must be None, 'cylinder' or 'foundation'"),
+    (lambda: scenes.cylinder(force=1e9), "too much for a cylinder"),
+    (lambda: scenes.cylinder(depth=0.0), "depth"),
+    (lambda: make_scene("punch-4d"), "unknown scene 'punch-4d'; choose from punch-2d"),
+    (lambda: make_scene("sphere", depth=3), "depth"),
+    (lambda: scenes.flat_punch(4), "dim must be 2 or 3"),
+    (lambda: scenes.flat_punch(2, mu=-0.1),
+     "friction coefficient mu must be a finite number at least 0"),
+    (lambda: scenes.flat_punch(2, mu=np.nan), "mu must be a finite number"),
+    (lambda: scenes.flat_punch(2, force=-1), "force must be a finite number greater than 0"),
+    (lambda: scenes.flat_punch(2, width=0), "width"),
+    (lambda: scenes.flat_punch(2, foundation_width=10), "at least as wide as the punch"),
+    (lambda: scenes.flat_punch(2, elements=0), "whole number"),
+    (lambda: scenes.flat_punch(2, elements=2.5), "whole number"),
+    (lambda: scenes.flat_punch(2, rigid="both"), "rigid must be"),
+    (lambda: scenes.sphere(force=1e9), "too much for a sphere"),
+    (lambda: scenes.sphere(rigid="punch"), "rigid must be"),
+    (lambda: scenes.sphere(radius=np.inf), "radius"),
+    (lambda: scenes.flat_punch(2, upper=Material(-5, 0.3)), "Young's modulus E"),
+])  # fmt: skip
 def test_bad_scenes_are_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()

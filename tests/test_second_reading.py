@@ -1,10 +1,4 @@
-"""Sentences of the pages that no assertion beside them holds are true.
-
-All pages written by hand, the tutorials, the chapters and the gallery were read once more, sentence
-by sentence: formulas were derived again, sentences with *always*, *never*, *only* or *if* were held
-against cases at the border of their hypothesis, and numbers were compared with their reports. Most
-claims have an assertion beside them, or a room of the museum. These have neither.
-"""
+"""Sentences of the pages that no assertion beside them holds are true."""
 
 from dataclasses import replace
 

@@ -13,9 +13,7 @@ def spd(n, seed=0):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_it_never_makes_an_answer_worse(seed):
-    """The first Newton step leads far away from a good start; cut off there, the start must come
-    back.
-    """
+    """The first Newton step leads far away from a good start, which must come back."""
     rng, none = np.random.default_rng(seed), np.zeros(0)
     A = rng.normal(size=(12, 3))
     Q, c, V = A @ A.T + 1e-6 * np.eye(12), rng.normal(size=12), np.zeros((12, 0))
@@ -31,9 +29,7 @@ def test_it_never_makes_an_answer_worse(seed):
 
 
 def test_a_singular_system_has_no_newton_step():
-    """Two plates that move alike: their multipliers are not unique, and nothing that is not finite
-    may come out.
-    """
+    """Two plates that move alike have multipliers that are not unique; all must be finite."""
     V, s, start = np.ones((3, 2)), -np.ones(2), np.ones((3, 1))
     equations = Equations(np.eye(3), np.zeros((3, 1)), V, s, half_line_derivative)
     at = evaluated(equations, start, np.zeros(2))

@@ -1,6 +1,4 @@
-"""Derivatives of solutions by the data of the interface problem, against central and one-sided
-differences.
-"""
+"""Derivatives of solutions by the data of the interface problem."""
 
 from dataclasses import replace
 
@@ -288,9 +286,7 @@ def test_at_a_kink_the_two_sides_differ():
 
 
 def test_at_the_apex_the_derivative_is_a_contact_problem_of_its_own():
-    """Without any force the problem looks the same in all scales: its derivative along d is the
-    solution for q = d.
-    """
+    """Without force all scales look the same: the derivative along d is the solution for q = d."""
     Q = np.array([[1.0, 0.4], [0.4, 1.2]])
     nothing = InterfaceProblem(Q, [[0.0, 0.0]], 0.5)
     apex = contactopt.sensitivity(
@@ -314,11 +310,8 @@ def test_units_do_not_matter():
     weight = np.random.default_rng(1).normal(size=problem.q.shape)
     one = contactopt.sensitivity(problem, solution).adjoint(reactions=weight)
     two = contactopt.sensitivity(other, scaled).adjoint(reactions=weight)
-    assert (
-        np.allclose(two.q * length / force, one.q)
-        and np.allclose(two.mu / force, one.mu)
-        and np.allclose(two.s, one.s)
-    )
+    assert np.allclose(two.q * length / force, one.q) and np.allclose(two.mu / force, one.mu)
+    assert np.allclose(two.s, one.s)
 
 
 def test_bad_input_is_refused_in_one_sentence():

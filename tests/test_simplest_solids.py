@@ -7,16 +7,7 @@ import pytest
 from test_simplest import SOFT, TIGHT, numbers, prism, punch
 
 import contactopt
-from contactopt import (
-    InputError,
-    Part,
-    Rigid,
-    Scene,
-    Support,
-    cli,
-    scenes,
-    simplify,
-)
+from contactopt import InputError, Part, Rigid, Scene, Support, cli, scenes, simplify
 from contactopt.meshes.structured import rename, tensor_mesh
 from contactopt.solving.solve_scene import solve_scene
 
@@ -24,9 +15,8 @@ from contactopt.solving.solve_scene import solve_scene
 def test_a_solid_that_is_a_plate_between_rollers_is_in_plane_strain():
     solid, plane = prism(), punch(force={"x": 1.0, "y": -10.0})
     found = simplify(solid, solve=False)
-    assert [each.name for each in found.found] == [
-        "plane strain"
-    ] and found.scene.kind == "plane-strain"
+    assert [each.name for each in found.found] == ["plane strain"]
+    assert found.scene.kind == "plane-strain"
     whole, section = (solve_scene(scene, options=TIGHT) for scene in (solid, found.scene))
     exact = solve_scene(replace(plane, thickness=1.5), options=TIGHT)
     assert np.allclose(numbers(section), numbers(exact), rtol=1e-8)
@@ -44,9 +34,7 @@ def test_a_prism_that_is_not_in_plane_strain(scene, reason):
 
 @pytest.mark.parametrize("way", ["gap", "friction", "curve"])
 def test_what_changes_along_a_prism_is_seen(way):
-    """A ridge, a slippery band or a crown over a part of a roller, where three stations along it
-    see nothing.
-    """
+    """On a part of a roller, where three stations along it see nothing."""
 
     def band(x: np.ndarray) -> np.ndarray:
         return np.abs(x[1] - 0.62) < 0.05
@@ -113,11 +101,8 @@ def test_friction_that_does_nothing_is_left_out():
 
 def test_a_report_reads_well_and_names_are_known():
     found = simplify(punch())
-    assert (
-        "mirror symmetry" in repr(found)
-        and "<table>" in found._repr_html_()
-        and str(found).count("\n") > 3
-    )
+    assert "mirror symmetry" in repr(found) and "<table>" in found._repr_html_()
+    assert str(found).count("\n") > 3
     with pytest.raises(
         InputError, match="no simplification 'plane strain'; found were: mirror symmetry"
     ):

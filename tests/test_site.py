@@ -1,6 +1,4 @@
-"""The documentation is built from scratch, warnings as errors, tutorials executed; its pages are
-whole.
-"""
+"""The documentation is built from scratch, warnings as errors, tutorials executed."""
 
 import re
 import subprocess
@@ -37,23 +35,10 @@ def titles() -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def built(titles, tmp_path_factory) -> Path:
-    """Site of a build in a process of its own; the folder of the sources is left as it was, but for
-    `generated`.
-    """
+    """Site of a build in a process of its own."""
     out = tmp_path_factory.mktemp("site")
-    command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-E",
-        "-d",
-        out / "doctrees",
-        SITE,
-        out / "html",
-    ]
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-E"]
+    command += ["-d", out / "doctrees", SITE, out / "html"]
     start = time.perf_counter()
     done = subprocess.run(
         [str(c) for c in command], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT

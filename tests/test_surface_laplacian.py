@@ -1,6 +1,4 @@
-"""The preconditioner of any contact mesh, against dense formulas, closed curves and the kernel of
-the half-space.
-"""
+"""The preconditioner of any contact mesh, against dense formulas."""
 
 from dataclasses import replace
 
@@ -9,15 +7,12 @@ import pytest
 import scipy.linalg as la
 from scipy.sparse.linalg import cg
 from skfem import MeshQuad, MeshTri
+from turned import renumbered
 
 from contactopt import InputError, InterfaceProblem, Material, Part, Scene, Support, reduce
 from contactopt.meshes.structured import graded
 from contactopt.methods.preconditioners import deflated, preconditioner, smooth_motions
-from contactopt.methods.preconditioners.surface import (
-    divergences,
-    laplacian,
-    surface_matrices,
-)
+from contactopt.methods.preconditioners.surface import laplacian, surface_matrices
 from contactopt.problem.chart import Chart
 
 POISSON = 0.3
@@ -119,13 +114,6 @@ def test_it_fits_half_spaces_under_any_surface(shape, size):
     assert iterations(None, problem.Q) > 1.3 * iterations(P, problem.Q)
 
 
-def test_quadrilaterals_are_cut_both_ways():
-    square = MeshQuad.init_tensor(np.linspace(0, 2, 4), np.linspace(0, 1, 3))
-    K, mass, _, share = surface_matrices(square.p, square.t)
-    assert square.p[0] @ K @ square.p[0] == pytest.approx(2.0) and mass.sum() == pytest.approx(2.0)
-    assert np.sort(share)[:4] == pytest.approx(0.25)
-
-
 def test_products_are_those_of_the_dense_root():
     problem = half_space(*disc(2))
     K, mass, shift, share = surface_matrices(problem.chart.places, problem.chart.cells)
@@ -147,17 +135,7 @@ def test_numbering_and_units_do_not_matter():
     k = problem.contacts
     order = np.random.default_rng(0).permutation(k)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
-    number = np.argsort(order)
-    chart = Chart(
-        1e3 * problem.chart.places[:, order], (False, False), None, number[problem.chart.cells]
-    )
-    mixed = replace(
-        problem,
-        Q=problem.Q[np.ix_(rows, rows)],
-        areas=1e6 * problem.areas[order],
-        coordinates=1e3 * problem.coordinates[:, order],
-        chart=chart,
-    )
+    mixed = renumbered(problem, order, unit=1e3)
     P = preconditioner(problem, "laplacian") @ np.eye(3 * k)
     R = preconditioner(mixed, "laplacian") @ np.eye(3 * k)
     assert np.allclose(R / np.trace(R), P[np.ix_(rows, rows)] / np.trace(P), atol=1e-9)
@@ -221,30 +199,6 @@ def test_on_a_closed_curve_the_circulant_is_exact(name):
         waves = np.fft.fft(P[::2, 0]).real * np.fft.fft(Q[::2, 0]).real
         found.append(waves[2:-1].max() / waves[2:-1].min())  # rigid motions are left out
     assert found[1] < 1.2 * found[0] < 10
-
-
-def test_tangential_waves_along_their_direction_meet_more_resistance():
-    """The plane waves of `grad u : grad v + ALONG div u div v` on a large square, far from its
-    edges.
-    """
-    mesh = MeshTri.init_tensor(*[np.linspace(0, 1, 33)] * 2)
-    x = mesh.p
-    D = divergences(x, x, mesh.t)
-    K = surface_matrices(x, mesh.t)[0]
-    wave = np.sin(2 * np.pi * x[0])
-    along, across = (np.stack([a * wave, b * wave], axis=1).ravel() for a, b in ((1, 0), (0, 1)))
-    # the divergence is the whole gradient
-    assert along @ D @ along == pytest.approx(wave @ K @ wave, rel=1e-12)
-    assert across @ D @ across == pytest.approx(0.0, abs=1e-9)
-    turned = np.array([[0.6, -0.8], [0.8, 0.6]])
-    u = np.random.default_rng(0).normal(size=(x.shape[1], 2))
-    same = divergences(turned @ x, turned @ x, mesh.t)
-    assert (u @ turned.T).ravel() @ same @ (u @ turned.T).ravel() == pytest.approx(
-        u.ravel() @ D @ u.ravel()
-    )
-    torn = x.copy()
-    torn[0] *= 3.0  # a chart that has lost the lengths
-    assert not divergences(x, torn, mesh.t).data.any()
 
 
 def test_a_surface_without_cells_is_refused():

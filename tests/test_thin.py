@@ -1,6 +1,4 @@
-"""Thin layers that contact and one support hold: displacement, stress and equilibrium down to 1e-4
-of the width.
-"""
+"""Thin layers that contact and one support hold, down to 1e-4 of the width."""
 
 import numpy as np
 import pytest
@@ -73,9 +71,7 @@ def test_a_layer_that_friction_alone_holds():
 
 
 def test_a_coating_between_two_contacts_is_reduced_and_does_not_matter():
-    """A coating of the block's material, without friction of its own, passes the pressure of the
-    punch on.
-    """
+    """A coating of the block's material passes the pressure of the punch on."""
     layer, block = shim(2, 1e-4, 2, 15).parts
     coat = Part("coat", layer.mesh, SOFT, (Support("x-", {"x": 0.0}),))
     punch = Rigid("punch", normal=(0, 1), gap=lambda x: x[0] ** 2 / 8, force={"y": -1.0})

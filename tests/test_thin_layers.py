@@ -62,9 +62,7 @@ def of_quadrilaterals(height, law) -> float:
 @pytest.mark.parametrize("height", [1e-2, 1e-4])
 @pytest.mark.parametrize("cells", [(9, 13), (30, 13), (12, 36)])
 def test_a_thin_layer_lies_on_a_block_whatever_its_elements_are(cells, height, law):
-    """As thick a layer has nearly the displacement of the block alone, which a layer of
-    quadrilaterals shows. On vertices alone, triangles are eleven times off.
-    """
+    """The block alone has nearly its displacement; on vertices alone, triangles are far off."""
     right = of_quadrilaterals(height, law)
     for cut in (False, True):
         assert farthest(layer(height, cut, cells, law=law)) == pytest.approx(right, rel=0.02)
@@ -92,9 +90,7 @@ def test_a_carrier_that_lets_a_thin_layer_bulge_draws_a_remark():
 @pytest.mark.parametrize("cut", [False, True])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_facets_above_another_boundary_are_thin(dim, cut):
-    """Also where the layer has several elements across it, and in any position; not where flat
-    elements lie on a thick body.
-    """
+    """Also with several elements across it; not where flat elements lie on a thick body."""
     turn = np.linalg.qr(np.random.default_rng(0).normal(size=(dim, dim)))[0]
     for layers in (1, 3):
         for height, thin in ((0.02, True), (0.2, False)):

@@ -1,6 +1,4 @@
-"""A time limit is kept by every method, inside its backend too, on problems that no method finds
-easy.
-"""
+"""A time limit is kept by every method, inside its backend too."""
 
 import os
 import signal
@@ -93,9 +91,7 @@ def test_no_cone_program_outlasts_it(case, backend):
     "backend", [b for b in QP if QP[b].installed and not QP[b].clock and not QP[b].steps]
 )
 def test_programs_that_no_backend_can_interrupt_end_in_time(backend, monkeypatch):
-    """A program of 401 unknowns in a process of its own: the same answer with time enough, and no
-    hang without.
-    """
+    """The same answer of a process of its own with time enough, and no hang without."""
     rng = np.random.default_rng(3)
     A = rng.normal(size=(401, 401))
     P, c, none = A @ A.T / 401 + 1e-2 * np.eye(401), rng.normal(size=401), np.zeros(0)

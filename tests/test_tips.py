@@ -8,25 +8,12 @@ import pytest
 import skfem
 from test_corners import KINDS, NU, E, box, seated
 
-from contactopt import (
-    Contact,
-    Material,
-    Part,
-    Rigid,
-    Scene,
-    Support,
-    Traction,
-    reduce,
-    run,
-    solve,
-)
+from contactopt import Contact, Material, Part, Rigid, Scene, Support, Traction, reduce, run, solve
 from contactopt.errors import InputError
 
 
 def walled(outline: np.ndarray, kind: str, dim: int, layers: int = 2):
-    """A wall between an outline (2, n), around the origin, and the same at half its size; in space
-    drawn out along z. Boundaries `outer` and `inner`.
-    """
+    """A wall between an outline (2, n), around the origin, and the same at half its size."""
     grids = [np.array([0.0, 1.0]), np.arange(outline.shape[1]), np.linspace(0, 1, layers + 1)]
     mesh = KINDS["quad", dim].init_tensor(*grids[:dim])
     if kind == "tri":

@@ -57,9 +57,7 @@ def test_other_backends_give_the_same(dim, backend):
 
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_the_convex_problem_is_solved_to_rounding(cube, bilateral):
-    """Every iterate obeys both laws for its own bounds, some of them zero, not only the last one
-    for Coulomb's.
-    """
+    """Every iterate obeys both laws for its own bounds, some of them zero."""
     problem, _ = dimensionless(cube)
     problem = replace(problem, law=(Bilateral if bilateral else Coulomb)(problem.mu))
     g = np.where(np.arange(cube.contacts) % 3 == 0, 0.0, 0.05)
@@ -75,9 +73,7 @@ def test_the_convex_problem_is_solved_to_rounding(cube, bilateral):
 
 
 def test_settings_are_checked():
-    assert Tresca().backends(2) == ("proxqp", "proxqp") and Tresca().backends(3) == (
-        "clarabel",
-        "clarabel",
-    )
+    assert Tresca().backends(2) == ("proxqp", "proxqp")
+    assert Tresca().backends(3) == ("clarabel", "clarabel")
     with pytest.raises(InputError, match="unknown conic backend 'proxqp'"):
         Tresca("proxqp").backends(3)

@@ -1,6 +1,4 @@
-"""Every tutorial runs as a script, its assertions hold, its exercises have solutions that run, its
-figures labels.
-"""
+"""Every tutorial runs as a script, its assertions hold, its exercises have solutions that run."""
 
 import ast
 import re
@@ -85,9 +83,7 @@ def test_links_between_tutorials_exist(source):
     ids=lambda p: p.stem,
 )
 def test_no_cell_shows_what_matplotlib_returns(path):
-    """The last expression of a cell is shown below it: a figure is, the legend object of matplotlib
-    is no figure.
-    """
+    """The last expression of a cell is shown: a figure is, an object of matplotlib is not."""
     for cell in re.split(r"^# %%", path.read_text(), flags=re.M)[1:]:
         head, _, code = cell.partition("\n")
         last = ast.parse("" if "[markdown]" in head else code).body[-1:]

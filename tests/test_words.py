@@ -37,14 +37,10 @@ def result():
 def test_an_object_says_in_one_line_what_it_is(result):
     objects = (result, result.solution, result.problem, result.reduction, diagnose(result.problem))
     for one in objects:
-        assert (
-            len(repr(one)) < 200
-            and "\n" not in repr(one)
-            and repr(one).startswith(type(one).__name__)
-        )
-    assert repr(result.solution).startswith("Solution(solved, residual ") and "5 contacts" in repr(
-        result
-    )
+        assert len(repr(one)) < 200 and "\n" not in repr(one)
+        assert repr(one).startswith(type(one).__name__)
+    assert repr(result.solution).startswith("Solution(solved, residual ")
+    assert "5 contacts" in repr(result)
     single = InterfaceProblem(np.eye(2), np.array([[-1.0, 0.0]]), 0.5)
     assert "1 contact," in repr(single) and "Coulomb mu = 0.5" in repr(single)
 
@@ -71,9 +67,8 @@ def test_a_notebook_shows_a_table_with_all_names_escaped(result):
 
 def test_the_grammar_of_a_diagnosis_agrees_with_its_numbers():
     single = InterfaceProblem(np.array([[2.0, 0.5], [0.5, 1.0]]), np.array([[-1.0, 0.0]]), 0.5)
-    assert str(diagnose(single)).startswith("1 contact in 2D") and "asymmetry 0" in str(
-        diagnose(single)
-    )
+    assert str(diagnose(single)).startswith("1 contact in 2D")
+    assert "asymmetry 0" in str(diagnose(single))
     tilted = InterfaceProblem(
         np.eye(4), -np.ones((2, 2)), 0.5, V=np.array([[0.0], [1.0], [0.0], [1.0]]), s=[0.0]
     )
@@ -82,16 +77,9 @@ def test_the_grammar_of_a_diagnosis_agrees_with_its_numbers():
 
 # values that are no number, never one, or one of many, beside what `count` says elsewhere
 MANY = {
-    "MOST_CONTACTS",
-    "MOST_LEVELS",
-    "MOST_ITERATIONS",
-    "FEW",
-    "most",
-    "cells",
-    "loose",
-    "law",
+    "MOST_CONTACTS", "MOST_LEVELS", "MOST_ITERATIONS", "FEW", "most", "cells", "loose", "law",
     "scene.copies",
-}
+}  # fmt: skip
 MANY |= {"scene.dim", "', '.join(map(str, SIZES[dim]))", "len(contacts)", "len(states)", "number"}
 MANY |= {"len(names)", "len(self.couplings)", "axes", "width"}  # said where there are several
 ALWAYS = {"unknown", "node", "name"}  # names is a verb, too

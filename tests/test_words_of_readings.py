@@ -1,6 +1,4 @@
-"""What a run says of a scene is so: no imbalance where nothing acts, no plane that is not there, no
-empty name, and no sign of a zero.
-"""
+"""What a run says of a scene is so: no imbalance where nothing acts, no plane that is not there."""
 
 from dataclasses import replace
 
@@ -17,6 +15,7 @@ from contactopt.outcome import summary_rows
 from contactopt.readings.places import PLACED
 from contactopt.readings.quantities import ROWS, find_quantity
 from contactopt.scenes import SCENES, make_scene
+from tests.test_sliding import fitted
 
 
 @pytest.mark.parametrize("moved", [-0.009, -0.5, 0.0, 3e-5])
@@ -105,20 +104,6 @@ def test_places_have_no_rounding_of_zero():
 
 
 def test_the_approach_of_a_fit_around_a_body_has_no_number():
-    hub = block("axisymmetric", -1.0, 1.0)
-    hub = replace(hub, doflocs=hub.p + np.array([[0.98], [0.0]]), _boundaries=None)
-    hub = hub.with_boundaries({"bore": lambda x: x[0] < 1.0, "foot": lambda x: x[1] < -1 + 1e-9})
-    shaft = block("axisymmetric", -1.0, 1.0)
-    shaft = shaft.with_boundaries({"skin": lambda x: x[0] > 1.0 - 1e-9})
-    push = Plate("top", {"z": -0.01}, glued=False)
-    result = run(
-        Scene(
-            "fit",
-            Part("hub", hub, MATERIAL, (Support("foot", {"z": 0.0}),), contact="bore"),
-            Part("shaft", shaft, MATERIAL, (), (push,), contact="skin"),
-            0.15,
-            kind="axisymmetric",
-        )
-    )
+    result = run(fitted(0.01))
     assert result.solution.solved and result.summary["approach"] is None
     assert "approach of the bodies" not in summary_rows(result.summary)

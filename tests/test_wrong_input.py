@@ -1,6 +1,4 @@
-"""One sentence instead of a hang, a traceback or a wrong answer: files and arguments that somebody
-once gave.
-"""
+"""One sentence instead of a hang, a traceback or a wrong answer."""
 
 import os
 from dataclasses import replace
@@ -77,9 +75,7 @@ def named(wrong):
 
 @pytest.mark.parametrize("name", ["W/x", "W/i", "vectors/q", "vectors/mu"])
 def test_sizes_that_a_file_only_declares_take_no_memory(tmp_path, name):
-    """A file of some kilobytes that announces 8 terabytes: a data set without data, which HDF5
-    reads as zeros.
-    """
+    """A data set without data announces 8 terabytes, which HDF5 reads as zeros."""
     import h5py
 
     path = sound(tmp_path / "huge.hdf5")
@@ -130,55 +126,47 @@ def test_loads_and_supports_of_the_wrong_type(make):
         )
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"normal": "up"},
-        {"normal": (0.0, 0.0)},
-        {"normal": (np.nan, 1.0)},
-        {"normal": (0.0, 1.0, 0.0)},
-        {"gap": "wide"},
-        {"gap": lambda x: np.full(x.shape[1] + 1, 0.1)},
-        {"gap": lambda x: np.full(x.shape[1], np.nan)},
-        {"gap": lambda x: None},
-        {"force": 3},
-        {"force": {"y": "heavy"}},
-        {"force": {"q": 1.0}},
-        {"displacement": {"y": np.inf}},
-        {"displacement": 1.0},
-        {"force": {"y": 1.0}, "displacement": {"y": 1.0}},
-    ],
-    ids=named,
-)
+@pytest.mark.parametrize("fields", [
+    {"normal": "up"},
+    {"normal": (0.0, 0.0)},
+    {"normal": (np.nan, 1.0)},
+    {"normal": (0.0, 1.0, 0.0)},
+    {"gap": "wide"},
+    {"gap": lambda x: np.full(x.shape[1] + 1, 0.1)},
+    {"gap": lambda x: np.full(x.shape[1], np.nan)},
+    {"gap": lambda x: None},
+    {"force": 3},
+    {"force": {"y": "heavy"}},
+    {"force": {"q": 1.0}},
+    {"displacement": {"y": np.inf}},
+    {"displacement": 1.0},
+    {"force": {"y": 1.0}, "displacement": {"y": 1.0}},
+], ids=named)  # fmt: skip
 def test_rigid_bodies_of_wrong_fields(fields):
     scene = flat_punch(2)
     with pytest.raises(InputError):
         reduce(Scene("s", scene.upper, Rigid("floor", **fields), 0.3, elements=4))
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"upper": 3},
-        {"lower": "punch"},
-        {"mu": None},
-        {"mu": -0.1},
-        {"mu": np.nan},
-        {"mu": "rough"},
-        {"mu": [[0.1], [0.1, 0.2]]},
-        {"mu": np.ones(77)},
-        {"mu": lambda x: "rough"},
-        {"mu": lambda x: -np.ones(x.shape[1])},
-        {"law": "glue"},
-        {"law": 3},
-        {"coupling": "rope"},
-        {"coupling": None},
-        {"carrier": "left"},
-        {"lower": "nobody"},
-        {"lower": "foundation:nowhere"},
-    ],
-    ids=named,
-)
+@pytest.mark.parametrize("fields", [
+    {"upper": 3},
+    {"lower": "punch"},
+    {"mu": None},
+    {"mu": -0.1},
+    {"mu": np.nan},
+    {"mu": "rough"},
+    {"mu": [[0.1], [0.1, 0.2]]},
+    {"mu": np.ones(77)},
+    {"mu": lambda x: "rough"},
+    {"mu": lambda x: -np.ones(x.shape[1])},
+    {"law": "glue"},
+    {"law": 3},
+    {"coupling": "rope"},
+    {"coupling": None},
+    {"carrier": "left"},
+    {"lower": "nobody"},
+    {"lower": "foundation:nowhere"},
+], ids=named)  # fmt: skip
 def test_contacts_of_wrong_fields(fields):
     scene = flat_punch(2)
     with pytest.raises(InputError):
@@ -288,9 +276,7 @@ def test_a_list_of_scenes_is_a_path():
 )
 @pytest.mark.parametrize("column", [[0.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [1e-300, 0.0]], ids=str)
 def test_a_plate_that_no_contact_can_hold(method, column):
-    """V is zero, moves along the surface of contacts without friction, or pulls: an answer or one
-    sentence.
-    """
+    """V is zero, moves along the surface, or pulls: an answer or one sentence."""
     problem = InterfaceProblem(np.eye(2), [[0.1, 0.0]], 0.0, np.array(column)[:, None], [-1.0])
     try:
         assert not solve(problem, method, max_iterations=50, time_limit=1.0).solved

@@ -36,17 +36,6 @@ def test_the_zone_ends_at_a_node_and_is_read_from_the_answer(hertz):
     assert len(zones) >= 3  # the first guess was not the answer
 
 
-def test_a_finer_mesh_without_remeshing_reads_the_same_zone(hertz):
-    """Four times as many elements, and no node at the edge: what the loop ends at is no property of
-    its meshes.
-    """
-    scene, _, _, zones = hertz
-    problem = reduce(scene, elements=4 * scene.elements, zone=1.1 * scene.reference.half_width)
-    assert contact_edge(scene, problem, solve(problem).reactions) == pytest.approx(
-        zones[-1], rel=5e-3
-    )
-
-
 @pytest.mark.parametrize("guess", [0.5, 2.0])
 def test_the_zone_does_not_depend_on_the_first_guess(hertz, guess):
     """From half and from twice the zone, to a thirtieth of an element."""
@@ -122,9 +111,7 @@ def test_the_status_of_contacts():
 
 
 def test_stick_ratio_of_the_rigid_punch():
-    """Spence's exact value .689087 for plane strain, nu = mu = .3, on a foundation 1,280
-    half-widths wide.
-    """
+    """Spence's exact value for plane strain, nu = mu = .3."""
     scene = scenes.flat_punch(
         2, rigid="punch", mu=0.3, foundation_width=25600, foundation_height=12800, elements=64
     )

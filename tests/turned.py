@@ -1,6 +1,4 @@
-"""Scenes that are not symmetric to the axes of space, and the same scenes turned or mirrored as a
-whole.
-"""
+"""Scenes that are not symmetric to the axes, and the same turned or mirrored."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,7 +6,17 @@ from dataclasses import replace
 import numpy as np
 import skfem
 
-from contactopt import Material, Part, Plate, Rigid, Scene, Support, Traction, scenes
+from contactopt import (
+    InterfaceProblem,
+    Material,
+    Part,
+    Plate,
+    Rigid,
+    Scene,
+    Support,
+    Traction,
+    scenes,
+)
 from contactopt.meshes.structured import graded, patch, rename, tensor_mesh
 
 SOFT, STIFF = Material(5.0, 0.3), Material(20.0, 0.2)
@@ -35,10 +43,7 @@ def mirror(dim: int, axis: int = 0) -> np.ndarray:
 
 
 def moved(scene: Scene, R: np.ndarray) -> Scene:
-    """The whole scene with every point x at R x: meshes, loads, curves, gaps.
-
-    Supports must hold all components.
-    """
+    """The whole scene with every point x at R x: meshes, loads, curves, gaps."""
 
     def mesh(part: Part) -> Callable:
         def build(elements, zone):
@@ -47,9 +52,17 @@ def moved(scene: Scene, R: np.ndarray) -> Scene:
 
         return build
 
-    def vector(values: dict[str, float]) -> dict[str, float]:
-        assert set(values) == set(scene.components), "give a value for every component"
-        return dict(zip(scene.components, R @ [values[name] for name in scene.components]))
+    def vector(values: dict[str, float] | None) -> dict[str, float] | None:
+        if values is None:
+            return None
+        names, moved = scene.components, R @ [values.get(name, 0.0) for name in scene.components]
+        if set(values) == set(names):
+            return dict(zip(names, moved))
+        there = np.abs(R) @ [name in values for name in names]
+        assert np.allclose(there, np.round(there), atol=1e-9), (
+            "give all components, or turn axes onto axes"
+        )
+        return {name: value for name, value, own in zip(names, moved, there) if own > 0.5}
 
     def load(old):
         if isinstance(old, Plate):
@@ -65,15 +78,31 @@ def moved(scene: Scene, R: np.ndarray) -> Scene:
                 part,
                 normal=None if part.normal is None else tuple(R @ np.array(part.normal)),
                 gap=None if part.gap is None else lambda x: part.gap(R.T @ x),
-                force=None if part.force is None else vector(part.force),
+                force=vector(part.force),
             )
-        assert all(support.displacement is None for support in part.supports), (
-            "clamp all components"
-        )
+        supports = tuple(replace(s, displacement=vector(s.displacement)) for s in part.supports)
         loads = tuple(load(old) for old in part.loads)
-        return replace(part, mesh=mesh(part), loads=loads, curve=curve(part))
+        mine = {"mesh": mesh(part), "curve": curve(part), "supports": supports, "loads": loads}
+        return replace(part, **mine)
 
     return replace(scene, upper=part_of(scene.upper), lower=part_of(scene.lower))
+
+
+def renumbered(problem: InterfaceProblem, order: np.ndarray, unit: float = 1.0) -> InterfaceProblem:
+    """The same contacts in another order, and their places in another unit of length."""
+    rows = (problem.dim * order[:, None] + np.arange(problem.dim)).ravel()
+    own = problem.chart
+    cells = None if own.cells is None else np.argsort(order)[own.cells]
+    return replace(
+        problem,
+        Q=problem.explicit().Q[np.ix_(rows, rows)],
+        q=problem.q[order],
+        law=problem.law.select(order),
+        V=problem.V[rows],
+        areas=unit**2 * problem.areas[order],
+        coordinates=unit * problem.coordinates[:, order],
+        chart=replace(own, places=unit * own.places[:, order], cells=cells),
+    )
 
 
 def _even(half: float, length: float, elements: int, growth: float = 1.5) -> np.ndarray:
@@ -131,9 +160,7 @@ def cylinder(elements: int = 8) -> Scene:
 
 
 def ring(inner: float, outer: float, layers: int, sectors: int) -> skfem.MeshQuad:
-    """A whole annulus of quadrilaterals, unevenly divided along the circle; boundaries 'inside' and
-    'outside'.
-    """
+    """A whole annulus of quadrilaterals, unevenly divided along the circle."""
     angle = 2 * np.pi * np.arange(sectors) / sectors
     angle = angle + 0.15 * np.sin(angle) + 0.05 * np.cos(3 * angle)
     radius = np.linspace(inner, outer, layers + 1)
@@ -157,11 +184,7 @@ def ring(inner: float, outer: float, layers: int, sectors: int) -> skfem.MeshQua
 def pin_in_bush(
     clearance: float = 0.5, sectors: int = 40, mu: float = 0.2, radius: float = 20.0
 ) -> Scene:
-    """A pin with a hole, loaded in the hole through a glued plate, in a bush that is clamped
-    outside.
-
-    A clearance beyond the node spacing is allowed: pi radius / 20 is the mean spacing.
-    """
+    """A pin with a hole, loaded in the hole through a glued plate."""
     pin = Part(
         "pin",
         ring(radius / 2, radius - clearance, 3, sectors),

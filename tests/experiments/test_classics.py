@@ -73,9 +73,7 @@ def test_the_receding_layer_of_finite_elements_is_that_of_the_integral_equation(
 
 
 def test_the_compliance_of_one_layer_is_the_closed_form():
-    """Vorovich's for a bonded layer, and that of a layer on a base without friction; layers of one
-    material are one layer.
-    """
+    """Vorovich's for a bonded layer, and that of a layer on a base without friction."""
     k, whole, halves = np.geomspace(1e-3, 50, 20), ((1.0, UNIT),), ((0.5, UNIT), (0.5, UNIT))
     kappa, s = 3 - 4 * UNIT.nu, 2 * k
     closed = (2 * kappa * np.sinh(s) - 2 * s) / (2 * kappa * np.cosh(s) + s**2 + 1 + kappa**2)

@@ -47,9 +47,7 @@ def ripple(cut):
 @pytest.mark.slow
 @pytest.mark.parametrize("cut", [False, True])
 def test_hertz_does_not_ripple_in_3d(cut):
-    """The error of the pressure is nearly the same at all nodes; contacts at all nodes of quadratic
-    tetrahedra would fail.
-    """
+    """The error is nearly the same at all nodes; contacts at all nodes would alternate."""
     own = ripple(cut)
     assert own < 0.03
     if cut:
@@ -61,9 +59,7 @@ def test_hertz_does_not_ripple_in_3d(cut):
 @pytest.mark.slow
 @pytest.mark.parametrize("cut", [False, True])
 def test_quadratic_elements_need_fewer_unknowns_for_hertz(cut):
-    """Largest nodal pressure and approach are closer on a quadratic mesh half as fine, of about as
-    many unknowns.
-    """
+    """Largest nodal pressure and approach are closer on a quadratic mesh half as fine."""
 
     def errors(elements, degree):
         scene = indenter("axisymmetric", 1e4, elements)

@@ -72,9 +72,7 @@ def test_a_question_in_a_folder_is_a_command_too(name):
 
 @pytest.mark.slow
 def test_the_picture_of_the_readme_shows_what_its_caption_says():
-    """Computed dots on exact curves, slip and stick named; away from the corners of the curves,
-    where elements blur them.
-    """
+    """Computed dots on exact curves, slip and stick named."""
     import numpy as np
 
     from experiments.questions.contact_picture import picture

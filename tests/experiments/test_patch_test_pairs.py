@@ -1,6 +1,4 @@
-"""Random pairs of surfaces of every kind pass a constant pressure on, and the harness finds those
-that do not.
-"""
+"""Random pairs of surfaces of every kind pass a constant pressure on."""
 
 from contactopt.coupling import coupling
 from experiments.questions.patch_test.judge import EXACT, judge

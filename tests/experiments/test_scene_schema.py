@@ -1,6 +1,4 @@
-"""Files that are made from the package say what it says: the schema of scene files, the names that
-options take.
-"""
+"""Files that are made from the package say what it says."""
 
 import json
 import subprocess

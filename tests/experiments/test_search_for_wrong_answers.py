@@ -1,6 +1,4 @@
-"""Two ways to one answer: the search finds what is wrong, and nothing where nothing is; what it
-found stays mended.
-"""
+"""Two ways to one answer: the search finds what is wrong, and nothing where nothing is."""
 
 from dataclasses import replace
 
