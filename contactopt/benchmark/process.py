@@ -205,8 +205,8 @@ class Process:
 
 
 def _kill_descendants(number: int, folder: str, dead: bool) -> bool:
-    """Kill what a process started, also in sessions of their own; whether there was any. Of one
-    that is dead these are all whose temporary files belong into its `folder`.
+    """Kill what a process started, also in sessions of their own; whether there was any. After its
+    own death these are all processes whose temporary files belong into its `folder`.
     """
     import psutil
 
