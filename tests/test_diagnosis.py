@@ -148,6 +148,12 @@ def test_local_thresholds_of_one_contact():
     assert diagnose(problem, slip).local.singular == pytest.approx(2 / 3)
 
 
+def test_all_open():
+    problem = InterfaceProblem(np.eye(4), np.ones((2, 2)), 0.5)
+    local = diagnose(problem, solve(problem)).local
+    assert local.open == 2 and local.alternating_rate == 0 and local.singular == np.inf
+
+
 def test_local_turns_with_the_direction_of_slip_in_3d():
     """One contact in 3D whose tangential compliance is not isotropic."""
     Q = np.array([[1.0, 0.5, 0.3], [0.5, 2.0, 0.4], [0.3, 0.4, 1.0]])

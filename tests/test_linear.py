@@ -125,6 +125,16 @@ def test_two_bodies_in_two_threads(name):
         np.testing.assert_allclose(x, solver.solve(b), rtol=1e-12, atol=1e-12 * np.abs(x).max())
 
 
+@pytest.mark.parametrize("name", SOLVERS)
+def test_products_with_the_trailing_block(name):
+    *_, last = args = BODIES["solid punch"]
+    load = np.random.default_rng(0).standard_normal((len(last), 2))
+    solver, right = made(name, args), made("superlu", args).trailing_inverse() @ load
+    limit = (1e-8 if name == "multigrid" else 1e-11) * np.linalg.norm(right)
+    assert np.linalg.norm(solver.trailing_product(load) - right) <= limit
+    assert np.linalg.norm(solver.trailing_product(load[:, 0]) - right[:, 0]) <= limit
+
+
 @pytest.mark.parametrize("name", ["superlu", "pardiso"])
 def test_the_order_of_the_trailing_unknowns_is_the_callers(name):
     *system, last = BODIES["solid punch"]

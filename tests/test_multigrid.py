@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 from test_linear import BODIES, made, system
 
@@ -64,6 +65,17 @@ def test_iterations_do_not_depend_on_units_and_vanish_without_load():
     for x, cycles in answers[1:]:
         assert np.linalg.norm(x - answers[0][0]) <= 1e-7 * np.linalg.norm(answers[0][0])
         assert cycles == answers[0][1] > 0
+
+
+def test_a_block_is_the_matrix_without_the_other_rows():
+    """Multigrid for a Submatrix, which copies nothing, is multigrid for its rows and columns."""
+    A, *rest = BODIES["solid punch"]
+    n = A.shape[0]
+    whole = sp.csr_matrix(sp.block_diag([np.eye(2), A, np.eye(3)]))
+    b = np.random.default_rng(0).standard_normal(n)
+    blocks = Submatrix(whole, np.arange(2, n + 2)), A
+    found = (made("multigrid", System(own, *rest)).solve(b) for own in blocks)
+    assert np.array_equal(*found)
 
 
 @pytest.mark.parametrize("degree", [1, 2])

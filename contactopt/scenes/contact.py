@@ -1,5 +1,6 @@
 """Which surfaces of which bodies may touch, and under which law."""
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,7 +27,7 @@ class Contact:
     mu            what the law reads: the friction coefficient, for 'tresca' a bound of the
                   tangential traction [stress]; a number >= 0, one per contact (k,), or a function
                   of the contacts' positions (dim, k) that gives either; for 'orthotropic' two
-                  coefficients instead of one; left out, or 0, for a law without friction
+                  coefficients instead of one; a law without friction reads none, and warns
     law           a name in contactopt.problem.laws.LAWS
     coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits
                   the surfaces
@@ -69,7 +70,8 @@ class Contact:
             )
         if not callable(self.mu):
             _check_friction(self.mu)
-        check_read(self.mu, self.law, f"contact '{self.name}': ")
+        if said := unread(self.mu, self.law):  # laws are compared by changing their name alone
+            warnings.warn(f"contact '{self.name}': {said}", stacklevel=3)
 
     @property
     def bodies(self) -> tuple[str, str]:
@@ -101,13 +103,11 @@ class Contact:
         return f"{name} = {' and '.join(f'{mu:g}' for mu in values)}" if one else f"{name} varies"
 
 
-def check_read(mu: Any, law: str, where: str = "") -> None:
-    """Raise InputError if a coefficient is given that the law of this name does not read."""
-    if not find_law(law).frictional and (callable(mu) or np.any(mu)):
-        raise InputError(
-            f"{where}the law '{law}' reads no mu; leave it out or give 0, or name a law with"
-            " friction."
-        )
+def unread(mu: Any, law: str) -> str:
+    """A sentence if a coefficient is given that the law of this name does not read."""
+    if find_law(law).frictional or not (callable(mu) or np.any(mu)):
+        return ""
+    return f"the law '{law}' reads no mu; leave it out or give 0, or name a law with friction."
 
 
 def _check_direction(name: str, direction: object, law: type[Law]) -> None:

@@ -20,7 +20,7 @@ from contactopt.errors import InputError
 from contactopt.files.toml_table import Table, at_line, change, read_table
 from contactopt.problem.laws import LAWS, find_law
 from contactopt.run_options import IN_FILES, OPTIONS, TOGETHER
-from contactopt.scenes.contact import SIDES, Contact, check_read
+from contactopt.scenes.contact import SIDES, Contact, unread
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 from contactopt.scenes.file_bodies import FileContext, bolted, function_of, read_body
 from contactopt.scenes.kinds import KINDS
@@ -254,9 +254,8 @@ def _contact(table: Table, parts: list[Any], reading: FileContext) -> Contact:
         mu: Any = tuple(table.numbers("mu", 2, "a number, or two: along and across a direction"))
     else:
         mu = function_of(table, "mu", reading, needed=_rubs(table.data))
-    if not _rubs(table.data):
-        with table.about("mu"):
-            check_read(mu, table.data["law"])
+    if not _rubs(table.data) and (said := unread(mu, table.data["law"])):
+        raise table.fail(said, "mu")
     names: dict[str, Any] = {"law": LAWS, "coupling": (), "carrier": SIDES}
     texts = {key: table.take(key, str, among=known) for key, known in names.items()}
     given: dict[str, Any] = {key: value for key, value in texts.items() if value is not None}
