@@ -1,6 +1,6 @@
 """Which surfaces of which bodies may touch, and under which law."""
 
-import warnings
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +10,8 @@ import numpy as np
 from contactopt.checks import check_number, real_array
 from contactopt.errors import InputError
 from contactopt.problem.laws import LAWS, Law, find_law
+
+log = logging.getLogger(__name__)
 
 SIDES = ("upper", "lower")
 
@@ -71,7 +73,7 @@ class Contact:
         if not callable(self.mu):
             _check_friction(self.mu)
         if said := unread(self.mu, self.law):  # laws are compared by changing their name alone
-            warnings.warn(f"contact '{self.name}': {said}", stacklevel=3)
+            log.warning("contact '%s': %s", self.name, said)
 
     @property
     def bodies(self) -> tuple[str, str]:
