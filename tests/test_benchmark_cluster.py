@@ -104,7 +104,7 @@ def test_a_killed_worker_loses_nothing_and_rows_are_those_of_one_machine(cluster
                 break
             time.sleep(0.1)
         os.kill(workers[0].pid, signal.SIGKILL)
-        assert campaign.wait(200) == 0
+        assert campaign.wait(400) == 0
     finally:
         campaign.kill()
     found = load(far)
