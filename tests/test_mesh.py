@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from skfem import Basis, ElementQuad1, Functional
+from skfem import Basis, ElementQuad1, Functional, MeshHex, MeshQuad, MeshTet, MeshTri
 
+from contactopt.meshes.cells import facets_at
 from contactopt.meshes.structured import contact_grid, graded, half_sphere_section
 
 
@@ -30,3 +31,15 @@ def test_half_sphere_section_is_a_quarter_disc_with_positive_elements():
     assert np.allclose(np.hypot(arc[0], arc[1] - radius), radius)
     assert np.allclose(mesh.p[0, mesh.facets[:, mesh.boundaries["axis"]]], 0)
     assert np.allclose(mesh.p[1, mesh.facets[:, mesh.boundaries["top"]]], radius)
+
+
+@pytest.mark.parametrize("kind", [MeshTri, MeshQuad, MeshTet, MeshHex])
+def test_facets_are_found_by_their_corners(kind):
+    """In any order of the corners; there is none at -1, nor at nodes within edges."""
+    mesh = kind().refined(2)
+    turned = np.random.default_rng(0).permuted(mesh.facets, axis=0)
+    assert np.array_equal(facets_at(mesh, turned), np.arange(mesh.nfacets))
+    for other in (-1, mesh.nvertices, mesh.nvertices + 7, mesh.facets[1, 0]):
+        wrong = mesh.facets[:, :1].copy()
+        wrong[0] = other
+        assert facets_at(mesh, wrong) == -1

@@ -178,10 +178,11 @@ def test_a_law_without_friction_needs_no_coefficient(caplog):
     for law in ("frictionless", "tied"):
         pair = Contact("punch", "foundation", law=law)
         assert (pair.mu, pair.friction) == (0.0, law)
-        for mu in (0.3, (0.0, 0.3), lambda x: 0.3):
-            Contact("punch", "floor", mu, law)
-            assert f"'punch-floor': the law '{law}' reads no mu" in caplog.messages.pop()
+        for mu in (0.3, lambda x: 0.3):
             caplog.clear()
+            reduce(replace(flat_punch(2, elements=4), law=law, mu=mu))
+            said = [text for text in caplog.messages if f"the law '{law}' reads no mu" in text]
+            assert len(said) == 1 and said[0].startswith("contact 'punch-foundation': ")
         with pytest.raises(InputError, match="reads no mu"):
             find_law(law)(0.3)
     with pytest.raises(InputError, match="contact 'a-b' has no mu, which the law 'coulomb' needs"):

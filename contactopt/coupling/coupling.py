@@ -29,7 +29,7 @@ from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.problem.chart import Chart
 from contactopt.problem.laws import Law, Place, make_law
-from contactopt.scenes.contact import Contact
+from contactopt.scenes.contact import Contact, unread
 from contactopt.scenes.scene import Scene
 
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
@@ -168,6 +168,8 @@ def _kind(name: str) -> Callable[..., Coupling]:
 def law_of(pair: Contact, made: Coupling) -> Law:
     """The law of the contacts of a pair of surfaces, with one parameter for each contact."""
     place = Place(made.areas, made.frames, pair.direction)
+    if said := unread(pair.mu, pair.law):  # laws are compared by changing their name alone
+        log.warning("contact '%s': %s", pair.name, said)
     with _about(pair):
         return make_law(pair.law, pair.mu, place, made.positions)
 

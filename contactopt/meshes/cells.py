@@ -176,10 +176,13 @@ def alone(corners: np.ndarray) -> np.ndarray:
 
 def facets_at(mesh: skfem.Mesh, corners: np.ndarray) -> np.ndarray:
     """Numbers (m,) of the facets with these corners (c, m), in whatever order; -1 where there is
-    none. A sum of random numbers, one for each node, stands for the corners.
+    none, and where a corner is -1 or a node within an edge. A sum of random numbers, one for each
+    node, stands for the corners.
     """
-    drawn = np.random.default_rng(0).integers(0, 2**63, mesh.p.shape[1] + 1, dtype=np.uint64)
-    known, wanted = drawn[mesh.facets].sum(axis=0), drawn[corners].sum(axis=0)
+    size = mesh.nvertices
+    drawn = np.random.default_rng(0).integers(0, 2**63, size + 1, dtype=np.uint64)
+    known = drawn[mesh.facets].sum(axis=0)
+    wanted = drawn[np.where(corners < size, corners, -1)].sum(axis=0)
     order = np.argsort(known)
     found = order[np.searchsorted(known, wanted, sorter=order).clip(max=len(order) - 1)]
     return np.where(known[found] == wanted, found, -1)

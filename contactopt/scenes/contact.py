@@ -1,6 +1,5 @@
 """Which surfaces of which bodies may touch, and under which law."""
 
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,8 +9,6 @@ import numpy as np
 from contactopt.checks import check_number, real_array
 from contactopt.errors import InputError
 from contactopt.problem.laws import LAWS, Law, find_law
-
-log = logging.getLogger(__name__)
 
 SIDES = ("upper", "lower")
 
@@ -29,7 +26,7 @@ class Contact:
     mu            what the law reads: the friction coefficient, for 'tresca' a bound of the
                   tangential traction [stress]; a number >= 0, one per contact (k,), or a function
                   of the contacts' positions (dim, k) that gives either; for 'orthotropic' two
-                  coefficients instead of one; a law without friction reads none, and warns
+                  coefficients instead of one; a law without friction reads none
     law           a name in contactopt.problem.laws.LAWS
     coupling      a name in contactopt.coupling.coupling.COUPLINGS, or 'auto' for the one that fits
                   the surfaces
@@ -72,8 +69,6 @@ class Contact:
             )
         if not callable(self.mu):
             _check_friction(self.mu)
-        if said := unread(self.mu, self.law):  # laws are compared by changing their name alone
-            log.warning("contact '%s': %s", self.name, said)
 
     @property
     def bodies(self) -> tuple[str, str]:
