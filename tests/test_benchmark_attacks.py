@@ -29,8 +29,11 @@ class Unreadable:
     def __array__(self, *given, **named):
         raise LookupError
 
+def pipes():
+    return [int(name) for name in os.listdir("/proc/self/fd") if int(name) > 2]
+
 def says(data):
-    for number in range(3, 64):
+    for number in pipes():
         try:
             os.write(number, data)
         except OSError:
@@ -52,7 +55,11 @@ def promises_a_long_answer(problem):
 
 @method
 def closes_the_pipe(problem):
-    os.closerange(3, 64)
+    for number in pipes():
+        try:
+            os.close(number)
+        except OSError:
+            pass
     time.sleep(1e4)
 
 @method
