@@ -265,14 +265,15 @@ def _logs(
 
 def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The least and the largest rank of each method that resampling the problems leaves likely."""
-    from scipy.stats import rankdata
+    import pandas as pd
 
     rng, ranks = np.random.default_rng(SEED), [np.ones((1, logs.shape[1]))]
     if len(logs):
         drawn = (
             rng.integers(len(logs), size=(BATCH, len(logs))) for _ in range(RESAMPLES // BATCH)
         )
-        ranks = [rankdata(logs[index].mean(axis=1), method="min", axis=1) for index in drawn]
+        means = (pd.DataFrame(logs[index].mean(axis=1)) for index in drawn)
+        ranks = [mean.rank(axis=1, method="min").to_numpy() for mean in means]
     low, high = np.nan_to_num(np.percentile(np.concatenate(ranks), LIKELY, axis=0))
     return np.floor(low).astype(int), np.ceil(high).astype(int)
 
