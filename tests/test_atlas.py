@@ -33,7 +33,9 @@ def test_the_method_still_fails_on_its_smallest_problem_and_the_proof_holds(name
     """If this fails because the method solves it now: search again, and change the page."""
     case, words = Case.of(OURS[name]["case"]), WORDS[name]
     end = run(name, case)
-    assert end.failed and end.what == OURS[name]["what"], f"{name} solves its problem now: {end}"
+    assert end.failed, f"{name} solves its problem now: {end.status}, {end.residual}"
+    # how the last stage of `auto` wanders depends on the last digits of Q; that it fails does not
+    assert name == "auto" or end.what == OURS[name]["what"]
     settings = words.get("settings", {})
     cured = case if settings else CURES[words["cure"]](case)
     assert not run(name, cured, **settings).failed
