@@ -279,14 +279,15 @@ def _rank_interval(logs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
-    """Kendall's tau of the ranks in two reruns; nan with fewer than two methods."""
-    from scipy.stats import kendalltau
-
+    """Kendall's tau-b of the ranks in two reruns; nan with fewer than two methods."""
     ranks = [ranking(points, accuracy).set_index("method")["mean"] for points in (one, other)]
     common = ranks[0].index.intersection(ranks[1].index)
     if len(common) < 2:
         return np.nan
-    return float(kendalltau(ranks[0][common], ranks[1][common]).statistic)
+    values = [r[common].to_numpy() for r in ranks]
+    one_sign, other_sign = (np.sign(np.subtract.outer(r, r)) for r in values)
+    size = np.linalg.norm(one_sign) * np.linalg.norm(other_sign)
+    return float(np.sum(one_sign * other_sign) / size) if size > 0 else np.nan
 
 
 def reruns(table: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
