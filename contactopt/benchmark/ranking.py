@@ -286,7 +286,7 @@ def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
         return np.nan
     values = [r[common].to_numpy() for r in ranks]
     one_sign, other_sign = (np.sign(np.subtract.outer(r, r)) for r in values)
-    size = np.linalg.norm(one_sign) * np.linalg.norm(other_sign)
+    size = np.sqrt(np.sum(one_sign**2) * np.sum(other_sign**2))
     return float(np.sum(one_sign * other_sign) / size) if size > 0 else np.nan
 
 
