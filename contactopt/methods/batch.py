@@ -1,9 +1,12 @@
-"""Many small problems of one size at once: Newton's method on all of them, vectorised.
+"""Many small problems of one size at once: compiled sweeps on each, then Newton's method on all that
+are left, vectorised.
 
 Each step solves (I - D + D rho Q) dr = P(r - rho u) - r for every problem that is not solved yet
 (contactopt.methods.kernels.semismooth), all in one call of LAPACK. What these steps do not solve,
 the default method solves. Every answer has the certificate of contactopt.problem.certificate.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +15,7 @@ from contactopt.checks import check_number, real_array
 from contactopt.defaults import TOL
 from contactopt.errors import InputError
 from contactopt.methods.driver import solve
+from contactopt.methods.small import solve_small
 from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
 from contactopt.problem.laws.coulomb import Coulomb
 
@@ -70,19 +74,26 @@ def solve_all(problems: list[InterfaceProblem], tol: float) -> list[Solution]:
     """The solutions of problems of one size as `problems_of` makes them."""
     if not problems or not problems[0].contacts:
         return [solve(problem, tol=tol) for problem in problems]
+    found = [solve_small(problem, tol)[0] for problem in problems]
+    rest = [problem for problem, solution in zip(problems, found) if solution is None]
+    others = _by_newton(rest, tol) if rest else iter(())
+    return [next(others) if solution is None else solution for solution in found]
+
+
+def _by_newton(problems: list[InterfaceProblem], tol: float) -> Iterator[Solution]:
+    """The solutions by Newton's method, of those that it does not solve by the default method."""
     forces, counts = _newton(
         np.stack([problem.Q for problem in problems]),
         np.stack([problem.q for problem in problems]),
         np.stack([problem.mu for problem in problems]),
     )
-    none, found = np.zeros(0), list[Solution]()
+    none = np.zeros(0)
     for problem, r, steps in zip(problems, forces, counts):
         residual = natural_map_residual(problem, r, none)
         if residual <= tol:
-            found.append(Solution(r, none, Status.SOLVED, residual, int(steps), NAME))
+            yield Solution(r, none, Status.SOLVED, residual, int(steps), NAME)
         else:
-            found.append(solve(problem, tol=tol))
-    return found
+            yield solve(problem, tol=tol)
 
 
 @np.errstate(all="ignore")  # what overflows is no solution, and is left to the default method

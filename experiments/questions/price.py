@@ -27,7 +27,7 @@ from experiments.questions.half_spaces.measured import apart, cpu
 from experiments.questions.half_spaces.rough import one, pressed
 from experiments.report import measure, template
 
-REPEATS = 5
+REPEATS = 7
 BATCH, SIZE = 256, 8
 GRIDS = (256, 512, 1024)
 IMPORTS = "import numpy, scipy, skfem, matplotlib"
@@ -45,19 +45,21 @@ def timed(act: Callable[[], Any], times: int = 1) -> float:
     return median(cpu(several)[0] for _ in range(REPEATS)) / times
 
 
-def command(*arguments: str) -> float:
-    """The median CPU seconds of a command as a whole process, of modules that are compiled."""
+def commands(*given: tuple[str, ...]) -> list[float]:
+    """The median CPU seconds of commands as whole processes, of modules that are compiled. They
+    take turns, so that a machine that slows down slows all of them.
+    """
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
 
-    def once() -> float:
+    def once(arguments: tuple[str, ...]) -> float:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        given = [sys.executable, *arguments]
-        subprocess.run(given, capture_output=True, check=True, env=environment)
+        call = [sys.executable, *arguments]
+        subprocess.run(call, capture_output=True, check=True, env=environment)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
-    once()
-    return median(once() for _ in range(REPEATS))
+    rounds = [[once(arguments) for arguments in given] for _ in range(REPEATS + 1)]
+    return [median(times) for times in zip(*rounds[1:])]
 
 
 def row(
@@ -96,14 +98,20 @@ def small() -> Rows:
 
 def words() -> Rows:
     """Commands that answer in words, and the first run."""
-    imports, numpy = command("-c", IMPORTS), command("-c", "import numpy")
     cli = ("-m", "contactopt")
     with tempfile.TemporaryDirectory() as folder:
-        first = command(*cli, "run", "punch-2d", "--out", folder)
+        imports, numpy, alone, helped, listed, first = commands(
+            ("-c", IMPORTS),
+            ("-c", "import numpy"),
+            ("-c", "import contactopt"),
+            (*cli, "--help"),
+            (*cli, "list"),
+            (*cli, "run", "punch-2d", "--out", folder),
+        )
     return [
-        row("contactopt --help", command(*cli, "--help"), 2.0, "import numpy", numpy),
-        row("contactopt list", command(*cli, "list"), 4.0, "import numpy", numpy),
-        row("import contactopt", command("-c", "import contactopt"), 0.05),
+        row("contactopt --help", helped, 2.0, "import numpy", numpy),
+        row("contactopt list", listed, 4.0, "import numpy", numpy),
+        row("import contactopt", alone, 0.05),
         row("contactopt run punch-2d with figures", first, 3.0, IMPORTS, imports),
     ]
 
