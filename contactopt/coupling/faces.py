@@ -160,12 +160,15 @@ class Faces:
         points x (dim, m), by Newton's iteration from `start`; one step is exact on affine faces.
         """
         at = np.array(np.broadcast_to(start, (self.dim - 1, len(face))))
+        left = np.arange(len(face))
         for _ in range(STEPS):
-            here, tangents = self.locations(face, at)
-            A = [[_along(axes, i, t) for t in tangents.swapaxes(0, 1)] for i in range(len(at))]
-            step = _solve(A, [_along(axes, i, x - here) for i in range(len(at))])
-            at = np.clip(at + step, -2.0, 3.0)
-            if np.abs(step).max(initial=0.0) < NEWTON or not self.distorted:
+            here, tangents = self.locations(face[left], at[:, left])
+            own, off = axes[left], x[:, left] - here
+            A = [[_along(own, i, t) for t in tangents.swapaxes(0, 1)] for i in range(len(at))]
+            step = _solve(A, [_along(own, i, off) for i in range(len(at))])
+            at[:, left] = np.clip(at[:, left] + step, -2.0, 3.0)
+            left = left[np.abs(step).max(axis=0) >= NEWTON]
+            if not len(left) or not self.distorted:
                 break
         return at
 
