@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,9 @@ from contactopt import (
     scenes,
     solve,
 )
+from contactopt.coupling import reduction
 from contactopt.coupling.back_to_bodies import recover
+from contactopt.solving.solve_scene import Options, solve_scene
 
 
 @pytest.mark.parametrize(
@@ -128,3 +131,13 @@ def test_a_plate_that_moves_along_the_contact():
     assert solution.reactions[:, 0].sum() == pytest.approx(3.0)
     assert solution.reactions[:, 1].sum() == pytest.approx(-0.5)
     assert solution.multipliers[0] > 0 > solution.multipliers[1]
+
+
+def test_a_long_reduction_says_what_it_does(monkeypatch):
+    """A large scene was silent for a minute behind one word."""
+    said = []
+    solve_scene(scenes.flat_punch(2, elements=8), options=Options(note=said.append))
+    assert not any("unknowns" in text for text in said)
+    monkeypatch.setattr(reduction, "LONG", 0.0)
+    solve_scene(scenes.flat_punch(2, elements=8), options=Options(note=said.append))
+    assert any(re.search(r"explicit Q by \w+, \d+ unknowns: about .* s$", text) for text in said)

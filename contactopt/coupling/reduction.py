@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -54,6 +54,7 @@ from contactopt.problem import InterfaceProblem, Solution
 from contactopt.scenes.scene import Scene
 
 log = logging.getLogger(__name__)
+LONG = 2.0  # expected seconds from which the reduction says what it does
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,6 +269,7 @@ def reduce_bodies(
     coupling: str | None = None,
     once: bool = True,
     made: Posed | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> Reduction:
     """Reduce a scene to its interface problem and keep the bodies, from which fields are recovered.
 
@@ -279,6 +281,7 @@ def reduce_bodies(
     once : Whether only one problem is solved, by Newton's method. If not, factors of the bodies are
         used again, and multigrid is taken only where it costs much less.
     made : The scene before anything is factorised, where it is known.
+    note : Receives a sentence about what is expected to take long.
 
     Returns
     -------
@@ -292,7 +295,7 @@ def reduce_bodies(
     assembled, couplings, maps, planes, spent = made
     times = [time.perf_counter()]
 
-    Q, solver = _way(scene, assembled, maps, (Q, solver), once)
+    Q, solver = _way(scene, assembled, maps, (Q, solver), once, note)
     iterate = any(body.iterates(solver) for body in assembled)
     implicit = Q == "implicit"
     log.info("scene '%s': %s Q of %d unknowns", scene.name, Q, maps[0].shape[0])
@@ -322,6 +325,7 @@ def _way(
     maps: Sequence[sp.csr_matrix],
     asked: tuple[str, str],
     once: bool,
+    note: Callable[[str], None] | None,
 ) -> tuple[str, str]:
     """The form of Q and the solver of the bodies that were asked for; for `auto`, those of
     the cheapest way. Where that takes many steps, the budget that is open gets its limit.
@@ -338,6 +342,9 @@ def _way(
     way, solver = min(costs, key=lambda own: costs[own])
     told = ", ".join(f"{name} {by} {cost:.2g} s" for (name, by), cost in costs.items())
     log.info("scene '%s': the way is %s by %s, of %s", scene.name, way, solver, told)
+    if note and costs[way, solver] > LONG:
+        size = sum(body.unknowns for body in assembled)
+        note(f"an {FORM_OF[way]} Q by {solver}, {size} unknowns: about {costs[way, solver]:.2g} s")
     fill(next_best(costs, sum(body.unknowns for body in assembled), once))
     return FORM_OF[way], solver
 

@@ -126,7 +126,8 @@ def solve_scene(
         raise InputError(f"a scene must be a Scene; got {type(scene).__name__}.")
     elements = scene.elements if elements is None else elements
     once = once and options.method in STEPS
-    options.note(f"reducing {scene.name}" + (f", zone {zone:.6g}" if zone is not None else ""))
+    zoned = f", zone {zone:.6g}" if zone is not None else ""
+    options.note(f"reducing {scene.name}{zoned}: meshes and coupling")
     made = posed(scene, elements, zone, options.Q)
     if start is not None and start.turned is not None:
         options = replace(options, Q=start.turned.Q, solver=start.turned.solver)
@@ -172,7 +173,7 @@ def _one_way(
 ) -> Solved:
     """The scene with `made` bodies, solved by the named or cheapest way; TooDear if it is slow."""
     reduction = reduce_bodies(
-        scene, elements, zone, options.Q, options.solver, once=once, made=made
+        scene, elements, zone, options.Q, options.solver, once=once, made=made, note=options.note
     )
     coarse: dict[str, float] = {}
     Q = reduction.problem.Q
