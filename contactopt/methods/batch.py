@@ -1,5 +1,5 @@
-"""Many small problems of one size at once: compiled sweeps on each, then Newton's method on all that
-are left, vectorised.
+"""Many small problems of one size at once: compiled sweeps on each, then Newton's method on all
+that are left, vectorised.
 
 Each step solves (I - D + D rho Q) dr = P(r - rho u) - r for every problem that is not solved yet
 (contactopt.methods.kernels.semismooth), all in one call of LAPACK. What these steps do not solve,
