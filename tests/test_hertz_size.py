@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import skfem
 from scipy.integrate import quad
 
-from contactopt import scenes
+from contactopt import Contact, Material, Part, Plate, Scene, Support, scenes
 from contactopt.figures.scene_check import check_scene
 from contactopt.readings.hertz_size import ellipse, hertz
 
@@ -45,3 +46,41 @@ def test_scenes_without_curves_or_with_unknown_forces_are_left_alone():
         scene = scenes.make_scene(name)
         check = check_scene((scene,))
         assert not hertz(scene, check.posed, check.free)
+
+
+def roller(turn: float) -> Scene:
+    """Part of a cylinder of radius 10 along 8 mm on a block that is longer, turned about z."""
+    c, s = np.cos(turn), np.sin(turn)
+
+    def body(name, x, y, z, bent, faces, **given):
+        mesh = skfem.MeshHex.init_tensor(x, y, z)
+        names = {
+            face: mesh.facets_satisfying(lambda p, at=at: np.isclose(p[2], at))
+            for face, at in faces.items()
+        }
+        p = mesh.p.copy()
+        p[2] += bent * (1 - p[2] / 2) * p[0] ** 2 / 20
+        p[:2] = np.array([[c, -s], [s, c]]) @ p[:2]
+        turned = skfem.MeshHex(p, mesh.t).with_boundaries(names)
+        return Part(name, turned, Material(2e5, 0.3), **given)
+
+    x, y, z = np.linspace(-2, 2, 9), np.linspace(0, 8, 5), np.linspace(0, 2, 4)
+    pushed = Plate("top", {"z": -400.0})
+    upper = body("upper", x, y, z, 1.0, {"contact": 0.0, "top": 2.0}, loads=(pushed,))
+    x, y, z = np.linspace(-3, 3, 7), np.linspace(-1, 9, 4), np.linspace(-2, 0, 4)
+    lower = body("lower", x, y, z, 0.0, {"contact": 0.0, "base": -2.0}, supports=(Support("base"),))
+    return Scene("roller", kind="solid", bodies=(upper, lower),
+                 contacts=(Contact("upper:contact", "lower:contact", 0.1),))  # fmt: skip
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4])
+def test_a_roller_touches_along_its_length(turn):
+    """The ellipse of so slight a curvature was wider than the roller, or there was none."""
+    scene = roller(turn)
+    check = check_scene((scene,))
+    (own,) = hertz(scene, check.posed, check.free).values()
+    assert own.widths[0] == pytest.approx(4.0)
+    assert own.widths[1] == pytest.approx(
+        np.sqrt(4 * 50.0 * 10 * 2 * 0.91 / (np.pi * 2e5)), rel=1e-3
+    )
+    assert own.place == pytest.approx([-4 * np.sin(turn), 4 * np.cos(turn), 0.0], abs=1e-9)

@@ -20,6 +20,7 @@ from contactopt.meshes.mesh_refinement import graded
 from contactopt.readings.hertz_size import Hertz, hertz
 from contactopt.scenes.scene import Scene
 
+SLENDER = 100.0  # length over width from which a contact takes too many elements
 GROWTH = 1.0  # by how much elements grow with the distance from the contact
 
 
@@ -34,7 +35,9 @@ def unseen(scene: Scene) -> dict[str, list[Hertz]]:
         return found
     for pair in scene.pairs:
         own = predicted.get(pair.name)
-        if own is not None and own.size > own.widths[-1]:
+        if own is None or own.widths[0] > SLENDER * own.widths[-1]:
+            continue
+        if own.size > own.widths[-1]:
             for body in pair.bodies:
                 found.setdefault(body, []).append(own)
     return found

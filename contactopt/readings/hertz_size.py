@@ -3,8 +3,9 @@ anything is solved.
 
 Near the place where the surfaces are nearest to each other their gap is y' H y / 2, of the tangents
 y. A quadratic fit through the nearest contacts gives H, and its eigenvalues are the relative
-curvatures. The force of each pair is the one that balances the loads, where one normal force at
-each of these places can do that. Source: Johnson (1985), Contact Mechanics, sections 4.1 and 4.2.
+curvatures. An ellipse that would be longer than the surface is a line along it. The force of each
+pair is the one that balances the loads, where one normal force at each of these places can do that.
+Source: Johnson (1985), Contact Mechanics, sections 4.1 and 4.2.
 """
 
 from typing import NamedTuple
@@ -17,7 +18,9 @@ from contactopt.scenes.scene import Scene
 
 NEAREST = {2: 5, 3: 16}  # contacts that are fitted, by the dimension
 ROUND, LONG = 1.001, 1e4  # ratios of curvatures between which a contact is an ellipse
+STRAIGHT = 1e-2  # of the larger curvature: below, the smaller one may be that of facets alone
 COARSEST, WANTED = 4.0, 8.0  # elements along the smallest half-width: too few, and enough
+ALONG = 0.9  # cosine of the angle between a direction and a plane's normal that are the same
 BALANCED = 1e-3  # share of the loads that the forces of the pairs may leave
 
 
@@ -75,6 +78,11 @@ def ellipse(force: float, modulus: float, small: float, large: float) -> tuple[f
     return float(a), float(a * np.sqrt(square))
 
 
+def _line(force_per_length: float, modulus: float, curvature: float) -> float:
+    """The half-width of a contact with one relative curvature [1 / length]."""
+    return float(np.sqrt(4 * force_per_length / (np.pi * modulus * curvature)))
+
+
 def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz]:
     """The prediction, by name, for each curved pair whose force follows from statics."""
     from scipy.optimize import nnls  # late, since it takes long to import
@@ -104,20 +112,27 @@ def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz
         H[rows, columns] = fit[1 + len(y) :]
         curvatures, ways = np.linalg.eigh(H + H.T)
         small, *_, large = [*curvatures] * (3 - len(y))
+        if abs(small) < STRAIGHT * large:
+            small = max(small, 2 * large / LONG)
         if rank < len(terms) or not (force > 0 and large < LONG * small):
             continue
         if scene.copies > 1:  # of one of the images, where they are apart
             force *= 2 ** len(made.planes) / scene.copies
-        place = made.positions[:, at]
+        place, axes = made.positions[:, at], ways.T @ made.frames[at, 1:]
         size = float(np.linalg.norm(apart[:, order[1]]))
         if scene.dim == 3:
             widths = ellipse(force, modulus, small, large)
+            cut = any(abs(plane.inward @ axes[0]) > ALONG for plane in made.planes)
+            ends = axes[0] @ made.positions
+            length = float(np.ptp(ends)) * (1 + cut)
+            if widths[0] > length / 2:
+                widths = length / 2, _line(force / length, modulus, large)
+                place = place + axes[0] * ((ends.min() + ends.max()) / 2 - ends[at])
         elif scene.analysis.revolved and place[0] <= size:
             widths = ellipse(force, modulus, large, large)
         else:
             depth = 2 * np.pi * place[0] if scene.analysis.revolved else scene.thickness
-            widths = (float(np.sqrt(4 * force / (np.pi * modulus * depth * large))),)
-        if widths[0] < np.ptp(made.positions, axis=1).max():
-            axes = ways.T @ made.frames[at, 1:]
+            widths = (_line(force / depth, modulus, large),)
+        if widths[-1] < np.ptp(made.positions, axis=1).max():
             found[pair.name] = Hertz(place, force, widths, size, axes)
     return found
