@@ -223,7 +223,7 @@ def test_the_last_step_of_a_path_is_the_load():
 
 
 @pytest.mark.parametrize(("scene", "load", "factor", "said"), [
-    (slope(0.0, 0.0), "block:left", 0.0, "any block:left"),
+    (slope(0.0, 0.0), "block:left", 0.0, "any amount of block:left"),
     (slope(support=(Support("right", {"x": 0.0}),)), "block:left", np.inf, "supports bear"),
     (pressed(), "block:top", np.inf, "below 0 times block:top, and at no larger"),
     (beneath(0.5), "block:top", np.inf,

@@ -48,7 +48,7 @@ def answer(scene: Scene, load: str, force: float | None, found: list[Found]) -> 
         return f"{scene.name}: the bodies {AWAY}, whatever the factor on {load} is."
     low, high = interval
     if low == high == 0:
-        return f"{scene.name}: any {load} makes the bodies {AWAY}: the factor is 0."
+        return f"{scene.name}: any amount of {load} makes the bodies {AWAY}: the factor is 0."
     why = WAYS["supports"] if way == "supports" else "its friction grows with the load"
     if np.isinf([low, high]).all():
         which = "factor" if way == "supports" else "positive factor"
