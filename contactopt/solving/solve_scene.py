@@ -200,7 +200,8 @@ def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Opt
     """
     step = before.reduction.loaded(scene).after(slipped)
     known = options.restart.start(step) if options.restart else None
-    return _solved(step, known or before.solution, options, {})
+    touched = np.any(before.solution.reactions)  # an unloaded state tells nothing of a loaded one
+    return _solved(step, known or (before.solution if touched else None), options, {})
 
 
 def _solved(
