@@ -12,6 +12,10 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
+import numpy as np
+
+LAST_STEPS = 1.5  # factor on the limit of work for the last steps of an iteration
+
 
 @dataclass(frozen=True)
 class NextBest:
@@ -35,14 +39,17 @@ class NextBest:
 
 @dataclass(eq=False)
 class Budget:
-    """The work done so far, and the way to take once it becomes too much."""
+    """The work done so far, the way to take once it becomes too much, and by how much the limit of
+    work was stretched.
+    """
 
     spent: float = 0.0
     instead: NextBest | None = None
+    stretched: float = 1.0
 
     def check(self, work: float) -> None:
         """Raise TooDear if this work in all is too much."""
-        if self.instead is not None and work > self.instead.most:
+        if self.instead is not None and work > self.stretched * self.instead.most:
             raise TooDear(self.instead)
 
 
@@ -50,7 +57,11 @@ class TooDear(Exception):
     """More work is needed than another way to the solution would cost.
 
     instead  the other way
+    reached  certificate, forces (k, dim) and multipliers of the best iterate so far; None if there
+             is none
     """
+
+    reached: tuple[float, np.ndarray, np.ndarray] | None = None
 
     def __init__(self, instead: NextBest):
         super().__init__(instead)
@@ -86,6 +97,11 @@ def spend(work: float) -> None:
     budget = _present()
     budget.spent += work
     budget.check(budget.spent)
+
+
+def finish() -> None:
+    """Let an iteration that is close to its end come there."""
+    _present().stretched = LAST_STEPS
 
 
 def spent() -> float:

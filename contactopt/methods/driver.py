@@ -11,6 +11,7 @@ import numpy as np
 from contactopt.checks import check_number
 from contactopt.defaults import TOL
 from contactopt.errors import BackendError, InputError
+from contactopt.linear.budget import TooDear, finish
 from contactopt.linear.deadline import TimeUp, until
 from contactopt.linear.operators import Interface, form, has_entries
 from contactopt.methods import (
@@ -44,6 +45,7 @@ from contactopt.problem.unbalanced_loads import check_equilibrium, resisted
 
 CLOSE = 1e-4  # residual up to which a problem that was not solved has a solution near by
 FAR = 0.1  # residual above which a method that works for long may be at one without a solution
+NEAR = 1e-5  # residual from which Newton's method takes a step or two more
 DOUBT, DEARER = 3, 0.25  # iterates before the proof is first looked for, and more per unknown
 log = logging.getLogger(__name__)
 EXACT, POLISHED = 1e-13, 8  # certificate of forces that surfaces may exchange, and steps to it
@@ -186,7 +188,11 @@ def _run(
         scaled.__dict__["swept"] = swept / scales.force
     first = None if start is None else dimensionless_start(start, problem, scales)
     recorder = Recorder(problem, scales, limits, first or at_rest(scaled))
-    ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
+    try:
+        ended, message, proof = _follow(method.iterate(scaled, first), scaled, recorder)
+    except TooDear as too_dear:
+        too_dear.reached = recorder.best[:3]
+        raise
     if not recorder.history:
         recorder.certify([])
     if getattr(method, "wanders", False) or recorder.lost:
@@ -229,6 +235,8 @@ def _follow(
             ended = recorder.record(iterate, _counts(scaled.Q))
             if ended in (Status.STALLED, Status.CYCLING) and not recorder.late:
                 ended, repeated = None, ended
+        if recorder.residual < NEAR:
+            finish()
         if ended is None and recorder.residual > FAR and len(recorder.history) > doubt:
             proof, doubt = infeasibility(recorder.problem, recorder.left()), 10 * doubt
             ended = None if proof is None else Status.INFEASIBLE

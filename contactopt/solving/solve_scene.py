@@ -47,6 +47,7 @@ log = logging.getLogger(__name__)
 # Steps of the default method, of which those of Newton and along interior paths are some forty,
 # until it is asked whether a state slides. One that does not starts again, without this bound.
 FIRST_TRY = 64
+REACHED = 1e-2  # certificate from which on what a way has reached is the start of the next one
 STEPS = (None, "auto", "newton")  # methods that take Newton's steps by themselves
 
 
@@ -136,14 +137,18 @@ def solve_scene(
     gone = 0.0
     notes: tuple[str, ...] = ()
     turned: NextBest | None = None
+    reached: Solution | None = None
     while True:
         begin = time.perf_counter()
         try:
             with open_budget(turned and turned.then):
-                solved = _one_way(scene, elements, zone, options, start, once, made)
+                solved = _one_way(scene, elements, zone, options, start, once, made, reached)
             break
         except TooDear as too_dear:
             turned = too_dear.instead
+            if too_dear.reached is not None and too_dear.reached[0] < REACHED:
+                residual, *point = too_dear.reached
+                reached = Solution(*point, Status.SETTLED, residual, 0, "the way that was left")
         gone += time.perf_counter() - begin
         notes = (*notes, _left(turned))
         options.note(notes[-1])
@@ -170,8 +175,11 @@ def _one_way(
     start: Solved | None,
     once: bool,
     made: Posed,
+    reached: Solution | None = None,
 ) -> Solved:
-    """The scene with `made` bodies, solved by the named or cheapest way; TooDear if it is slow."""
+    """The scene with `made` bodies, solved by the named or cheapest way, from what another way has
+    `reached`; TooDear if it is slow.
+    """
     reduction = reduce_bodies(
         scene, elements, zone, options.Q, options.solver, once=once, made=made, note=options.note
     )
@@ -180,17 +188,23 @@ def _one_way(
     # half-spaces have coarse grids of their own
     products = form(Q) == "products"
     coarser = elements // FACTOR[scene.dim]
-    first = options.restart.start(reduction) if options.restart and start is None else None
+    first = reached if reached is not None and _fits(reached, reduction.problem) else None
+    if first is None and options.restart and start is None:
+        first = options.restart.start(reduction)
     if start is None and first is None and products and not scene.given and coarser >= COARSEST:
         begin = time.perf_counter()
         start = solve_scene(scene, coarser, zone, replace(options, tol=max(ROUGH, options.tol)))
         coarse = {"coarse": time.perf_counter() - begin}
     options.note(f"solving {count(reduction.problem.contacts, 'contact')}")
-    if start is not None:
+    if start is not None and first is None:
         first = transfer(start.reduction.problem, start.solution, reduction.problem)
     solved = _solved(reduction, first, options, coarse)
     log.info("%s: %s, %s", scene.name, count(elements, "element"), solved.solution.status)
     return solved
+
+
+def _fits(start: Solution, problem: InterfaceProblem) -> bool:
+    return start.reactions.shape == problem.q.shape and start.multipliers.shape == problem.s.shape
 
 
 def solve_loaded(scene: Scene, before: Solved, slipped: np.ndarray, options: Options) -> Solved:
