@@ -147,8 +147,8 @@ def solve_scene(
         except TooDear as too_dear:
             turned = too_dear.instead
             if too_dear.reached is not None and too_dear.reached[0] < REACHED:
-                residual, *point = too_dear.reached
-                reached = Solution(*point, Status.SETTLED, residual, 0, "the way that was left")
+                residual, r, multipliers = too_dear.reached
+                reached = Solution(r, multipliers, Status.SETTLED, residual, 0, "given")
         gone += time.perf_counter() - begin
         notes = (*notes, _left(turned))
         options.note(notes[-1])
