@@ -284,7 +284,7 @@ def agreement(one: pd.DataFrame, other: pd.DataFrame, accuracy: float) -> float:
     common = ranks[0].index.intersection(ranks[1].index)
     if len(common) < 2:
         return np.nan
-    values = [r[common].to_numpy() for r in ranks]
+    values = [r[common].to_numpy() for r in ranks]  # SciPy's statistics take a second to import
     one_sign, other_sign = (np.sign(np.subtract.outer(r, r)) for r in values)
     size = np.sqrt(np.sum(one_sign**2) * np.sum(other_sign**2))
     return float(np.sum(one_sign * other_sign) / size) if size > 0 else np.nan

@@ -25,7 +25,8 @@ class NextBest:
     Q, solver : The form of Q and the solver of the bodies to take instead.
     expected : Work [steps times unknowns] of the way that is left, by its estimate.
     most : Work that costs as much as both ways were estimated to cost. Who gives up after it has
-        spent at most twice what the better of the two would have taken.
+        spent at most twice what the better of the two would have taken. An iteration that is close
+        to its end may take LAST_STEPS times this work.
     then : What takes the place of this way in turn; None where nothing does.
     """
 
