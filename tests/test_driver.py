@@ -39,6 +39,32 @@ WRONG = [(0.5 + 0.01 * i, 0.0) for i in range(50)]
 FORCE = 1.0  # the unit of force of the dimensionless problem
 
 
+@dataclass(frozen=True)
+class Far:
+    """A method whose multipliers lie beyond all digits, of a motion that moves no contact."""
+
+    def iterate(self, problem, start=None):
+        yield np.array([[1 / FORCE, 0.0]]), np.array([1e16])
+
+
+def test_an_iterate_that_is_not_kept_is_not_solved():
+    """Its certificate was that of the answer, which was without forces."""
+    solution = solve(replace(PROBLEM, V=np.zeros((2, 1)), s=np.zeros(1)), Far())
+    assert not solution.solved and solution.residual == np.inf
+
+
+@pytest.mark.parametrize("s", [1e-16, -1e-17])
+def test_rounding_in_the_balance_is_no_unit_of_force(s):
+    """Without forces it was solved, with the certificate inf."""
+    A, V = np.random.default_rng(1).normal(size=(8, 8)), np.zeros((4, 2, 1))
+    V[:, 0, 0] = 1, 1, -1, -1
+    q = np.array([[-1.0, 0.0], [-0.8, 0.0], [-1.1, 0.0], [-0.9, 0.0]])
+    problem = InterfaceProblem(A @ A.T + 4 * np.eye(8), q, 0.3, V.reshape(-1, 1), [s])
+    found, exact = solve(problem), solve(replace(problem, s=np.zeros(1)))
+    assert found.solved and natural_map_residual(problem, found.reactions) < 1e-8
+    assert np.allclose(found.reactions, exact.reactions, rtol=1e-8) and np.all(exact.reactions[:, 0])
+
+
 def test_solved_is_the_certificates_word():
     solution = solve(PROBLEM, Scripted(((1 / FORCE, 0.0),)))
     assert solution.status is Status.SOLVED and solution.reactions[0] == pytest.approx([1, 0])

@@ -15,6 +15,7 @@ from contactopt import (
     Material,
     Part,
     Plate,
+    Pressure,
     Rigid,
     Scene,
     Support,
@@ -64,6 +65,17 @@ def test_a_block_under_its_own_weight_without_friction(dim, degree):
         assert elastic_energy(reduction, solution) == pytest.approx(
             2.0**2 / (6 * stiffness), rel=1e-9
         )
+
+
+def test_the_rounding_of_normals_is_no_load_along_a_face():
+    """A side that is vertical to the last digit but one lifts nothing."""
+    mesh = block([0.0, 0.0], [1.0, 1.0], [2, 2])
+    p = mesh.p + 1e-16 * (mesh.p[0] == 1.0) * mesh.p[1] * [[1.0], [0.0]] * 2
+    mesh = replace(mesh, doflocs=p).with_boundaries({"side": lambda x: x[0] > 0.9})
+    held = (Support("left", {"x": 0.0}),)
+    mesh = mesh.with_boundaries({"left": lambda x: x[0] == 0})
+    part = Part("b", mesh, SOFT, held, (Pressure("side", 2.0),), contact="bottom")
+    assert np.ptp(p[0, p[0] > 0.9]) > 0 and not np.any(reduce_bodies(alone(part)).problem.s)
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.5])

@@ -53,9 +53,11 @@ class Motions:
 
 
 def work(fields: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """The resultants (m,) of nodal forces (n,) in motions (n, m), rounding made zero."""
-    found = fields.T @ forces
-    return np.where(np.abs(found) > BALANCED * (np.abs(fields).T @ np.abs(forces)), found, 0.0)
+    """The resultants (m,) of nodal forces (n,) in motions (n, m), rounding made zero: that of sums,
+    and that of the normals which turn a pressure into forces.
+    """
+    found, size = fields.T @ forces, np.abs(fields).max(axis=0, initial=0.0) * np.abs(forces).sum()
+    return np.where(np.abs(found) > BALANCED * size, found, 0.0)
 
 
 def rigid_fields(x: np.ndarray) -> np.ndarray:

@@ -104,7 +104,7 @@ class Recorder:
             limits.progress(len(self.history), self.residual)
             if watch := getattr(limits.progress, "watch", None):
                 watch(self.reactions, self.multipliers)
-        if self.residual <= limits.tol:
+        if self.residual <= limits.tol and not self.lost:  # what is lost is not the answer
             return Status.SOLVED
         if limits.change_tol is not None and len(self.history) > 1 and change <= limits.change_tol:
             return Status.SETTLED

@@ -81,8 +81,8 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     """Scale a problem so that the mean diagonal of Q is one, forces are of order one and the
     columns of V have length one, in all units alike. The Scales take its answers back.
 
-    The force scale is the mean force that the balance asks of a node or, without a balance, that
-    which removes the root-mean-square overlap. Components that cannot move get a unit compliance.
+    The force scale is the mean force that the balance asks of a node or, where that is nothing or
+    rounding, that which removes the root-mean-square overlap. Components that cannot move get a unit compliance.
     """
     scales, held = scales_of(problem), immovable(problem)
     compliance, columns = scales.length / scales.force, scales.length / scales.multipliers
@@ -119,7 +119,8 @@ def scales_of(problem: InterfaceProblem) -> Scales:
         compliance = float(np.mean(d[d > 0]))
     else:  # rigid bodies: only gaps have a length
         compliance = (float(np.abs(problem.q).max(initial=0.0)) or 1.0) / (balanced or 1.0)
-    force = balanced or _closing(problem) / compliance or 1.0
+    closing = _closing(problem) / compliance
+    force = (balanced if balanced > NOISE * closing else closing) or 1.0
     length = force * compliance
     return Scales(force, length, length / np.where(columns > 0, columns, 1.0))
 
