@@ -62,7 +62,9 @@ def test_rounding_in_the_balance_is_no_unit_of_force(s):
     problem = InterfaceProblem(A @ A.T + 4 * np.eye(8), q, 0.3, V.reshape(-1, 1), [s])
     found, exact = solve(problem), solve(replace(problem, s=np.zeros(1)))
     assert found.solved and natural_map_residual(problem, found.reactions) < 1e-8
-    assert np.allclose(found.reactions, exact.reactions, rtol=1e-8) and np.all(exact.reactions[:, 0])
+    assert np.allclose(found.reactions, exact.reactions, rtol=1e-8) and np.all(
+        exact.reactions[:, 0]
+    )
 
 
 def test_solved_is_the_certificates_word():

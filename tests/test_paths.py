@@ -7,6 +7,7 @@ import pytest
 from conftest import MATERIAL, block, two_blocks
 
 from contactopt import (
+    Contact,
     InputError,
     Material,
     Part,
@@ -340,3 +341,23 @@ def test_a_path_that_begins_without_a_load_has_no_remarks_of_newton():
         states.append(Scene("begins", part, Rigid("floor"), 0.4))
     path = follow(states)
     assert path.solved and not any(state.solution.notes for state in path.states)
+
+
+def test_a_stack_without_loads_has_no_remarks_and_stays_where_it_slid():
+    """A middle body turns freely between the others, where Newton's system was singular."""
+    mesh, states = block("plane-strain", 0, 1), []
+    for x, y in ((0.0, 0.0), (0.5, -3.0), (0.0, 0.0), (0.0, -3.0)):
+        plate = Plate("top", {"x": x, "y": y})
+        top = Part("top", mesh, MATERIAL, (), (plate,), "bottom")
+        middle = Part("middle", block("plane-strain", -1, 0, 7, 1.6), MATERIAL, contact="bottom")
+        low = block("plane-strain", -2, -1, 9, 2.1)
+        base = Part("base", low, MATERIAL, (Support("bottom"),), contact="top")
+        pairs = Contact("top", "middle:top", 0.3), Contact("middle", "base", 0.3)
+        bodies = top, middle, base
+        states.append(Scene("stack", bodies=bodies, contacts=pairs))
+    path = follow(states)
+    assert path.solved and not any(state.solution.notes for state in path.states)
+    assert not np.any(path.states[2].solution.reactions)
+    for own in path.reduction.problem.pairs:  # what bends back slides to both sides
+        slip = path.states[2].slip[own.contacts, 0]
+        assert abs(slip.mean()) < 1e-9 < 1e-3 < np.abs(slip).max()

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from conftest import MATERIAL, block, two_blocks
 
-from contactopt import Contact, InputError, Part, Plate, Scene, Support, Traction, run
+from contactopt import Contact, InputError, Part, Plate, Scene, Support, Traction, follow, run
 from contactopt.bodies.assembled import Guides
 from contactopt.checks import place_words
 from contactopt.coupling.planes_of_symmetry import mirror_planes
 from contactopt.figures import scene_check
+from contactopt.meshes.structured import simplices
 from contactopt.outcome import summary_rows
 from contactopt.readings.places import PLACED
 from contactopt.readings.quantities import ROWS, find_quantity
@@ -96,6 +97,20 @@ def test_zeros_have_no_sign():
         for own in table.values():
             for value in (*own["force"], *own["moment"]):
                 assert value != 0 or np.copysign(1, value) > 0
+
+
+@pytest.mark.parametrize("force", [3.0, 0.7])
+def test_friction_that_is_rounding_is_none(force):
+    """A search for its accuracy said that it does not converge."""
+    scene = two_blocks("plane-strain", force, mu=0.3)
+    made = simplices(scene.lower.mesh)
+    scene = replace(scene, lower=replace(scene.lower, mesh=made.refined()))
+    result = run(scene, figures=(), accuracy=0.1, quantity="shear_force")
+    assert np.any(result.solution.reactions[:, 1])
+    assert result.summary["pairs"]["upper-lower"]["friction_force"] == 0.0
+    assert result.estimate.reached and result.estimate.value == 0.0
+    path = follow([scene, scene])
+    assert not np.any(path.history["shear_force"])
 
 
 def test_places_have_no_rounding_of_zero():

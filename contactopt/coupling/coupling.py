@@ -32,6 +32,7 @@ from contactopt.problem.laws import Law, Place, make_law
 from contactopt.scenes.contact import Contact, unread
 from contactopt.scenes.scene import Scene
 
+ROUNDING = 2.0**-48  # of the difference of two places, over their size
 COVERED = 0.99  # a contact with less than this share of its faces lies where the other surface ends
 log = logging.getLogger(__name__)
 
@@ -197,6 +198,8 @@ def of_contacts(
     chart, frames, order = laid_out
     gap, areas = points.gap[order], points.areas[order]
     places = np.take(points.points, order, axis=1)  # each component by itself in memory
+    # the places of both sides are rounded
+    gap = np.where(np.abs(gap) > ROUNDING * np.abs(places).max(initial=0.0), gap, 0.0)
     cells = points.cells if chart.cells is None else chart.cells
     planes = tuple(symmetry_planes(points))
     share = None if share is None else share[order]

@@ -82,7 +82,8 @@ def dimensionless(problem: InterfaceProblem) -> tuple[InterfaceProblem, Scales]:
     columns of V have length one, in all units alike. The Scales take its answers back.
 
     The force scale is the mean force that the balance asks of a node or, where that is nothing or
-    rounding, that which removes the root-mean-square overlap. Components that cannot move get a unit compliance.
+    rounding, that which removes the root-mean-square overlap. Components that cannot move get a
+    unit compliance.
     """
     scales, held = scales_of(problem), immovable(problem)
     compliance, columns = scales.length / scales.force, scales.length / scales.multipliers

@@ -7,7 +7,7 @@ import numpy as np
 
 from contactopt.bodies.views import acting, held_by, plates
 from contactopt.coupling.reduction import Reduction
-from contactopt.defaults import EQUAL
+from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.problem import Solution, alone
 from contactopt.problem.cones import lengths
 from contactopt.problem.contact_status import contact_status
@@ -163,10 +163,11 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
         problem, r = view.problem, own.reactions
         status, zone = contact_status(problem, r), contact_zone(view.scene, problem, r)
         level = is_level(problem, view.coupling.frames, r)
+        friction = float(lengths(r[:, 1:]).sum())
         pairs[name] = found.table | {
             "bodies": bodies[name],
             "normal_force": float(r[:, 0].sum()),
-            "friction_force": float(lengths(r[:, 1:]).sum()),
+            "friction_force": friction if friction > ROUNDED * lengths(r).sum() else 0.0,
             "friction_bound": float(problem.law.bound_along(r).sum()),
             "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
             "contact_area": contact_area(view.scene, problem, r, zone[0]),

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import ROUNDED
 from contactopt.errors import InputError
 from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem.cones import lengths
 from contactopt.problem.laws import Place, find_law
 from contactopt.scenes.parameters import Parameter
 
@@ -89,4 +91,10 @@ class Functional:
             raise InputError(
                 f"the weights of a functional must have the shape {shape}; got {weights.shape}."
             )
-        return Seeds(float(np.sum(weights * state.solution.reactions)), reactions=weights)
+        return Seeds(total(weights, state.solution.reactions), reactions=weights)
+
+
+def total(weights: np.ndarray, r: np.ndarray) -> float:
+    """The sum of weights times forces, both (k, dim), zero where it is rounding beside them."""
+    found = float(np.sum(weights * r))
+    return found if abs(found) > ROUNDED * float(lengths(weights) @ lengths(r)) else 0.0

@@ -37,6 +37,7 @@ from contactopt.files.writing import whole_folder
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.edges import contact_edge, stick_edge
+from contactopt.readings.state import total
 from contactopt.scenes.scene import Scene
 
 
@@ -224,7 +225,7 @@ def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
         edges = contact_edge(state.scene, problem, r), stick
     return {
         "normal_force": float(r[:, 0].sum()),
-        "shear_force": -float(r[:, 1].sum()),
+        "shear_force": 0.0 - total(np.broadcast_to(np.eye(problem.dim)[1], r.shape), r),
         "approach": 0.0 - state.risen,
         "shift": state.shifted,
         "contact_half_width": edges[0],

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy.linalg as la
 
 from contactopt.cards import count
 from contactopt.coupling.posed import Posed, posed
@@ -23,7 +24,7 @@ from contactopt.linear.operators import form, loosened
 from contactopt.methods.auto import Auto
 from contactopt.methods.driver import solve
 from contactopt.methods.method import Method
-from contactopt.problem import InterfaceProblem, Solution, Status
+from contactopt.problem import InterfaceProblem, Solution, Status, natural_map_residual
 from contactopt.problem.transfer import transfer
 from contactopt.readings.constants import (
     BALANCED,
@@ -228,7 +229,7 @@ def _solved(
         lines = options.restart.watching(lines)
 
     def answer(problem: InterfaceProblem, start: Solution | None) -> Solution:
-        found = certified(problem, start, options.tol)
+        found = certified(problem, start, options.tol) or _unloaded(problem, options.tol)
         usual = (
             options.method in (None, "auto", Auto()) and "max_iterations" not in options.settings
         )
@@ -263,6 +264,26 @@ def _solved(
         solution = replace(solution, message=f"{words} ({solution.message})")
     return Solved(
         _knowing(reduction, solution, options.tol), replace(solution, seconds=dict(seconds))
+    )
+
+
+def _unloaded(problem: InterfaceProblem, tol: float) -> Solution | None:
+    """Without loads and overlaps, no forces and the motions with the least slip, where the laws
+    allow them; no method is needed, and Newton's meets a singular system.
+    """
+    if not len(problem.s) or np.any(problem.s) or np.any(problem.q[:, 0] < 0):
+        return None
+    V = problem.V.reshape(*problem.q.shape, -1)
+    along = la.null_space(V[:, 0])
+    slips = V[:, 1:].reshape(-1, len(problem.s)) @ along
+    lam = along @ np.linalg.lstsq(slips, -problem.q[:, 1:].ravel(), rcond=None)[0]
+    r, status = np.zeros(problem.q.shape), Status.SOLVED
+    residual = natural_map_residual(problem, r, lam)
+    if residual > tol:
+        return None
+    seconds = {"solve": 0.0, "certificate": 0.0}
+    return Solution(
+        r, lam, status, residual, 0, "none", seconds=seconds, message=f"{status.sentence}, no load"
     )
 
 
