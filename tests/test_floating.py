@@ -220,6 +220,16 @@ def test_friction_holds_up_to_its_limit(side, holds):
         assert solve(problem, tol=1e-9).solved
 
 
+@pytest.mark.parametrize(("angle", "axis"), [(10.0, "x"), (80.0, "y")])
+def test_a_motion_that_nothing_resists_is_named_after_its_largest_part(angle, axis):
+    R = turned.turn(angle)
+    mesh = block([0.0, 0.0], [1.0, 1.0], [2, 2])
+    mesh = replace(mesh, doflocs=R @ mesh.p)
+    part = Part("b", mesh, SOFT, (), (Traction("top", tuple(-R[:, 1])),), "bottom")
+    (note,) = solve(reduce_bodies(alone(part, Rigid("floor", tuple(R[:, 1])), 0.0)).problem).notes
+    assert f"motion of body 'b': translation along {axis}:" in note
+
+
 @pytest.mark.parametrize("law", ["tied", "bilateral", "coulomb"])
 @pytest.mark.parametrize("cells", [3, 4])
 def test_a_scene_that_nothing_holds_is_solved_or_told_so(law, cells):

@@ -112,12 +112,20 @@ def resisted(problem: InterfaceProblem) -> tuple[InterfaceProblem, np.ndarray | 
 
 
 def _names(problem: InterfaceProblem, loose: np.ndarray) -> str:
-    """Names of the first motions that together determine the loose ones (p, f)."""
-    names, left = [], loose.copy()
-    for number, size in enumerate(np.linalg.norm(loose, axis=1)):
-        if (rest := np.linalg.norm(left[number])) > SURE * size:
-            names.append(_label(problem, number))
-            left -= np.outer(left @ left[number], left[number]) / rest**2
+    """Names of motions that together determine the loose ones (p, f): the largest of the first
+    bodies.
+    """
+    labels = [_label(problem, number) for number in range(len(loose))]
+    owners = [label.partition(":")[0] for label in labels]
+    left, names = loose * np.where(problem.reach > 0, problem.reach, 1.0)[:, None], []
+    whole = np.linalg.norm(left, axis=1)
+    for owner in dict.fromkeys(owners):
+        own = np.array([name == owner for name in owners])
+        while np.any((sizes := own * np.linalg.norm(left, axis=1)) > SURE * whole):
+            number = int(np.argmax(sizes > (1 - SURE) * sizes.max()))  # the first of equal ones
+            names.append(labels[number])
+            row = left[number] / sizes[number]
+            left = left - np.outer(left @ row, row)
     return ", ".join(names)
 
 
