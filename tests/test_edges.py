@@ -92,6 +92,23 @@ def test_a_surface_of_which_one_corner_is_open_is_no_disc():
     assert contact_edge(scene, problem, r) == pytest.approx(np.sqrt(areas[1:].sum()) / 2, rel=1e-12)
 
 
+def test_a_strip_across_a_coarse_surface_is_no_disc():
+    """To within an element it was one, larger than the surface."""
+    x = np.stack(np.meshgrid(0.3 * np.arange(11), np.arange(7) / 3, indexing="ij")).reshape(2, -1)
+    share = np.array([0, 0, 0.19, 0.53, 0.87, 1, 0.87, 0.53, 0.19, 0, 0])  # under a bolt's head
+    areas = np.ones((11, 7))
+    for end in ([0, -1], slice(None)), (slice(None), [0, -1]):
+        areas[end] /= 2
+    scene, problem = contact(x, "solid", 0.1 * areas.ravel())
+    first = np.arange(77).reshape(11, 7)[:-1, :-1].ravel()
+    cells = np.stack([first, first + 7, first + 8, first + 1])
+    problem = replace(problem, chart=replace(problem.chart, cells=cells))
+    r = np.zeros((77, 3))
+    r[:, 0] = problem.areas * np.repeat(share, 7)
+    edge = contact_edge(scene, problem, r)
+    assert contact_area(scene, problem, r, edge) == pytest.approx(7 * 0.3 * 2, rel=1e-12)
+
+
 def disc(x, half, centre=0.0):
     return np.sqrt(np.maximum(0.0, 1 - ((x - centre) / half) ** 2))
 

@@ -117,16 +117,16 @@ def _names(problem: InterfaceProblem, loose: np.ndarray) -> str:
     """
     labels = [_label(problem, number) for number in range(len(loose))]
     owners = [label.partition(":")[0] for label in labels]
-    left, names = loose * np.where(problem.reach > 0, problem.reach, 1.0)[:, None], []
+    left, found = loose * np.where(problem.reach > 0, problem.reach, 1.0)[:, None], []
     whole = np.linalg.norm(left, axis=1)
     for owner in dict.fromkeys(owners):
         own = np.array([name == owner for name in owners])
         while np.any((sizes := own * np.linalg.norm(left, axis=1)) > SURE * whole):
             number = int(np.argmax(sizes > (1 - SURE) * sizes.max()))  # the first of equal ones
-            names.append(labels[number])
+            found.append(number)
             row = left[number] / sizes[number]
             left = left - np.outer(left @ row, row)
-    return ", ".join(names)
+    return ", ".join(labels[number] for number in sorted(found))
 
 
 def _label(problem: InterfaceProblem, number: int) -> str:

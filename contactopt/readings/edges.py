@@ -30,6 +30,7 @@ from scipy.spatial import KDTree
 
 from contactopt.coupling.reduction import Reduction
 from contactopt.defaults import EQUAL
+from contactopt.meshes.cells import rim
 from contactopt.problem import InterfaceProblem, Solution
 from contactopt.problem.contact_status import ContactStatus, contact_status
 from contactopt.readings.constants import (
@@ -203,13 +204,24 @@ def _half_width(
     ends = [patch for patch in found if patch is not None and patch.last > patch.first]
     if not found or len(ends) < len(found):  # not read, or read beyond the middle
         return coarse
-    if problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step:
-        return coarse  # no disc: the zone reaches the rim of the surface on some sides, or is long
+    long = problem.dim == 3 and abs(ends[0].last - np.sqrt(area / np.pi)) > ends[0].step
+    if long or (problem.dim == 3 and _reaches_rim(problem, inside)):  # no disc
+        return coarse
     uncertainty = sum(patch.copies * max(patch.uncertainty, least * patch.step) for patch in ends)
     if scene.analysis.revolved and not ring:  # between two distances from the axis, or a disc
         squares = (abs(p.last**2 - (p.first**2 if p.first > 0 or p.last < 0 else 0)) for p in ends)
         return float(np.sqrt(sum(squares))), uncertainty
     return sum(patch.copies * (patch.last - patch.first) / 2 for patch in ends), uncertainty
+
+
+def _reaches_rim(problem: InterfaceProblem, inside: np.ndarray) -> bool:
+    """Whether a zone reaches an end of its surface that is no plane of symmetry."""
+    if problem.chart.cells is None:
+        return False
+    sides, places = rim(problem.chart.cells), problem.chart.places
+    cut = np.abs(places) <= EQUAL * np.ptp(places, axis=1)[:, None]
+    cut &= np.array(problem.chart.mirrored)[:, None]
+    return bool(np.any(inside[sides] & ~np.all(cut[:, sides], axis=1).any(axis=0)))
 
 
 def _counted(scene: Scene, problem: InterfaceProblem, inside: np.ndarray) -> float:

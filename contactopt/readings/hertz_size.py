@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.posed import Posed
+from contactopt.defaults import EQUAL
 from contactopt.problem import InterfaceProblem
 from contactopt.scenes.scene import Scene
 
@@ -83,12 +85,19 @@ def _line(force_per_length: float, modulus: float, curvature: float) -> float:
     return float(np.sqrt(4 * force_per_length / (np.pi * modulus * curvature)))
 
 
+def _nearest(made: Coupling) -> int:
+    """The contact with the least gap, of those along a line the one in the middle."""
+    equal = np.flatnonzero(made.gap - made.gap.min() <= EQUAL * np.ptp(made.gap))
+    x = made.positions[:, equal]
+    return int(equal[np.argmin(np.linalg.norm(x - x.mean(axis=1, keepdims=True), axis=0))])
+
+
 def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz]:
     """The prediction, by name, for each curved pair whose force follows from statics."""
     from scipy.optimize import nnls  # late, since it takes long to import
 
     pairs = zip(free.pairs, posed.couplings)
-    nearest = [pair.contacts.start + int(np.argmin(made.gap)) for pair, made in pairs]
+    nearest = [pair.contacts.start + _nearest(made) for pair, made in pairs]
     work = free.V.reshape(free.contacts, scene.dim, -1)[nearest, 0]  # (pairs, motions)
     if np.linalg.matrix_rank(work) < len(nearest):
         return {}
@@ -100,7 +109,7 @@ def hertz(scene: Scene, posed: Posed, free: InterfaceProblem) -> dict[str, Hertz
     for pair, made, force in zip(scene.pairs, posed.couplings, forces):
         materials = [getattr(parts[name], "material", None) for name in pair.bodies]
         modulus = 1 / sum((1 - own.nu**2) / own.E for own in materials if own is not None)
-        at = int(np.argmin(made.gap))
+        at = _nearest(made)
         apart = made.positions - made.positions[:, at : at + 1]
         y = made.frames[at, 1:] @ apart
         order = np.argsort(np.linalg.norm(apart, axis=0))[: NEAREST[scene.dim]]
