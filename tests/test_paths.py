@@ -331,18 +331,6 @@ def test_a_path_refuses_states_of_other_bodies():
             follow([scene, other], elements=2)
 
 
-def test_a_path_that_begins_without_a_load_has_no_remarks_of_newton():
-    """The next state started from a state without forces, where Newton's system was singular."""
-    mesh = block("plane-strain", 0, 1)
-    states = []
-    for share in (0.0, 0.5, 1.0):
-        loads = (Plate("top", {"x": 0.5 * share, "y": -3.0 * share}),)
-        part = Part("block", mesh, MATERIAL, (), loads, "bottom")
-        states.append(Scene("begins", part, Rigid("floor"), 0.4))
-    path = follow(states)
-    assert path.solved and not any(state.solution.notes for state in path.states)
-
-
 def test_a_stack_without_loads_has_no_remarks_and_stays_where_it_slid():
     """A middle body turns freely between the others, where Newton's system was singular."""
     mesh, states = block("plane-strain", 0, 1), []
