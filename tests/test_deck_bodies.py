@@ -143,6 +143,21 @@ def test_shells_that_are_no_side_of_a_body_are_told(tmp_path, caplog):
     (tmp_path / "deck.inp").write_text(BRICK + "\n" + FACE + fin)
     load_mesh(tmp_path / "deck.inp")
     assert "deck.inp: 1 shell off the sides and edges" in caplog.text
+    caplog.clear()
+    (tmp_path / "deck.inp").write_text(BRICK + "\n" + fin + "*SURFACE, NAME=F\n91, SPOS\n")
+    load_mesh(tmp_path / "deck.inp")
+    assert "deck.inp: 1 shell off the sides and edges" in caplog.text
+
+
+def test_cards_that_are_no_body_leave_it_as_it_is(tmp_path, caplog):
+    """Quadrilaterals of any order of the card CQUAD, rods without property, cards of contact."""
+    others = "CONROD,9,1,2,1,.1\nCONTACT,8,,2,3,0.2\nCONTPRM,,1.\nCREEP,1\nCORD2R,1,,0.,0.,0.\n"
+    (tmp_path / "a.bdf").write_text(PLATE + others + "ENDDATA\n")
+    check(tmp_path / "a.bdf", "7", 1, {}, 4)
+    assert not caplog.text
+    (tmp_path / "a.bdf").write_text(PLATE + "CONM2,9,1,,1.\nENDDATA\n")
+    check(tmp_path / "a.bdf", "7", 1, {}, 4)
+    assert "without extent are left out: CONM2" in caplog.text
 
 
 BAR = "*ELEMENT, TYPE={}, ELSET=BAR\n900,1,2\n901,1,{}\n"
@@ -152,6 +167,8 @@ CARDS = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\
 
 
 CARDS += "CTETRA,1,7,1,2,3,4\nCBAR,2,8,1,2\n"
+PLATE = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,1.,1.,0.\nGRID,4,,0.,1.,0.\n"
+PLATE += "CQUAD,1,7,1,2,3,4\n"
 
 
 @pytest.mark.parametrize(
@@ -177,6 +194,13 @@ CARDS += "CTETRA,1,7,1,2,3,4\nCBAR,2,8,1,2\n"
             "a.inp, line 8: the thickness 2 of 1 element CPE4",
         ),
         ("a.inp", ONE + "*SOLID SECTION, ELSET=B, MATERIAL=M\n1.", ""),
+        (
+            "a.inp",
+            ONE.replace("CPE4", "S4R") + "*SHELL SECTION, ELSET=B, MATERIAL=M\n2.5, 5",
+            "a.inp, line 8: the thickness 2.5 of 1 element S4R",
+        ),
+        ("a.bdf", PLATE + "PSHELL,7,1\nENDDATA", ""),
+        ("a.bdf", PLATE + "PSHELL,7,1,2.5\nENDDATA", "a.bdf, line 5: the thickness 2.5 of 1"),
         ("a.inp", ONE + "*REBAR, ELEMENT=CONTINUUM\nB,1", "a.inp, line 8: the stiffness of *REBAR"),
         ("a.bdf", CARDS + "PSOLID,7,1\nENDDATA", ""),
         (

@@ -118,6 +118,10 @@ MEANT = {
         "1,1,2,3,4,5,6\n*ELEMENT, TYPE=B32, ELSET=S\n8,1,4,2\n",
         0.5, {"S": 1}, 3,
     ),
+    "a beam with its direction": (
+        BRICK + "\n*ELEMENT, TYPE=B31\n5,1,2,7\n*ELEMENT, TYPE=B32\n6,1,4,3,7\n" + RIGHT,
+        1, {"S": 1}, 8,
+    ),
     "skin of shells": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN, SPOS\n", 1, {"S": 1}, 8),
     "skin without a side": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN,\n", 1, {"S": 1}, 8),
     "all sides": (BRICK + "\n*SURFACE, NAME=S\nB\n", 1, {"S": 6}, 8),

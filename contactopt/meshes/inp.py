@@ -28,8 +28,18 @@ from contactopt.checks import place_words
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
-from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of
-from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Later, Named, bare, blocks, set_of
+from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of, words_of
+from contactopt.meshes.inp_text import (
+    LARGEST,
+    SECTIONS,
+    THICK,
+    Block,
+    Later,
+    Named,
+    bare,
+    blocks,
+    set_of,
+)
 from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
@@ -89,7 +99,8 @@ def read_inp(path: Path) -> Any:
     of_points = {n: np.searchsorted(tags, sorted(f)) for n, f in whole.node_sets.items()}
     rows = [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in cells]
     rows = [(k, in_order(points, n) if k == "hexahedron27" else n) for k, n in rows]
-    return meshio.Mesh(points, rows, cell_sets=of_cells, point_sets=of_points)
+    sets = {"cell_sets": of_cells, "point_sets": of_points}
+    return meshio.Mesh(points, rows, **sets, info=words_of(whole))
 
 
 def _places(ids: np.ndarray, found: Iterable[int]) -> np.ndarray:
@@ -98,8 +109,9 @@ def _places(ids: np.ndarray, found: Iterable[int]) -> np.ndarray:
 
 def _thickness(block: Block) -> float:
     """The number below a section of plane elements, 1 without one."""
-    solid = [(line, words[0]) for line, words in block.rows if block.keyword == "solidsection"]
-    return block.real(*solid[0]) if solid and solid[0][1] else 1.0
+    plain = block.keyword in THICK and "composite" not in block.options
+    first = [(line, words[0]) for line, words in block.rows if plain and words[0]]
+    return block.real(*first[0]) if first else 1.0
 
 
 def _instance(parts: dict[str, Scope], block: Block) -> Scope:
@@ -217,11 +229,8 @@ class Scope:
             lost = np.argwhere(~np.isin(nodes, known) & (nodes > 0 if not kind else True))
             if len(lost):
                 block, line = where[lost[0, 0]]
-                raise block.fail(
-                    f"an element {block.options.get('type', '')} names a node that is not there,"
-                    f" {nodes[tuple(lost[0])]}",
-                    line,
-                )
+                said = f"an element {block.options.get('type', '')} names a node that is not there,"
+                raise block.fail(f"{said} {nodes[tuple(lost[0])]}", line)
         both: Any = ((self.node_sets, self.nodes, "node"), (self.element_sets, self.elements, ""))
         for sets, there, what in both:
             for name, found in sets.items():
@@ -286,6 +295,8 @@ class Scope:
             if not rows or not kind or len(rows[-1]) == 1 + nodes:
                 rows.append([])
                 where.append((block, line))
+            if named[0] == "B" and len(words) == 2 + nodes:  # the last directs the section
+                words = words[:-1]
             rows[-1] += [block.whole(line, word) for word in words]
             if kind and len(rows[-1]) > 1 + nodes:
                 raise block.fail(f"an element {named} has a number and {nodes} nodes", line)

@@ -39,10 +39,8 @@ READ = {
     "endpart": "", "endassembly": "", "endinstance": "",
 }  # fmt: skip
 # keywords that give elements a stiffness, with any options
-SECTIONS = {
-    *("beamsection", "beamgeneralsection", "framesection", "membranesection"),
-    *("shellsection", "shellgeneralsection", "solidsection"),
-}
+THICK = {"membranesection", "shellsection", "solidsection"}  # the first number below is a thickness
+SECTIONS = THICK | {"beamsection", "beamgeneralsection", "framesection", "shellgeneralsection"}
 STIFFENING = {"foundation", "rebar", "rebarlayer"}  # keywords of what elements do not show
 DEEPEST = 10  # files that include each other
 LARGEST = 2**31  # numbers of nodes, elements and lines are smaller

@@ -66,12 +66,14 @@ class FileGroups:
     members     (name, dimension) -> for each block the numbers of those elements that belong to the
                 group
     point_sets  name -> nodes
+    words       type in meshio -> what the file calls it, and where, if that is known
     """
 
     points: np.ndarray
     blocks: tuple[tuple[str, np.ndarray, int], ...]
     members: Mapping[tuple[str, int], Mapping[int, np.ndarray]]
     point_sets: Mapping[str, np.ndarray]
+    words: Mapping[str, str]
 
     def names(self, dim: int) -> list[str]:
         """Names of the groups of elements of a dimension."""
@@ -125,7 +127,7 @@ def read_groups(path: Path) -> FileGroups:
                 raise InputError(
                     f"mesh file '{path}': the set {name!r} names an element that is not there."
                 )
-    return FileGroups(np.asarray(mesh.points), blocks, members, sets)
+    return FileGroups(np.asarray(mesh.points), blocks, members, sets, mesh.info or {})
 
 
 def _read(path: Path) -> Any:

@@ -84,7 +84,8 @@ def read_msh2(path: Path) -> Any:
         for tag in np.unique(rows[rows[:, 0] > 0, 0]).tolist():
             name = names.get((_dimension_of(kind), tag), str(tag))
             none = [np.arange(0) for _ in table]
-            sets.setdefault(name, none)[i] = np.flatnonzero(rows[:, 0] == tag)
+            own = sets.setdefault(name, none)  # groups may share a name
+            own[i] = np.append(own[i], np.flatnonzero(rows[:, 0] == tag))
     return _mesh(points, tags, [(kind, rows[:, 1:]) for kind, rows in table.items()], sets)
 
 
@@ -126,14 +127,15 @@ def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any
     twice = np.flatnonzero(np.diff(tags[order]) == 0)
     if (points[order[twice]] != points[order[twice + 1]]).any():
         raise Damaged(f"node {tags[order[twice[0]]]} is there twice")
-    cells = []
+    cells, words = [], {}
     for kind, rows in blocks:
         place = np.searchsorted(tags, rows, sorter=order)
         if rows.size and (place.max() == len(tags) or (tags[order[place]] != rows).any()):
             raise Damaged("an element names a node that is not there")
         name = _gmsh_to_meshio_type[kind]
+        words[name] = f"{name} (number {kind} of Gmsh)"
         cells.append((name, _gmsh_to_meshio_order(name, order[place])))
-    return meshio.Mesh(points, cells, cell_sets=sets)
+    return meshio.Mesh(points, cells, cell_sets=sets, info=words)
 
 
 class _Numbers:
