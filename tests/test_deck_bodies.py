@@ -111,6 +111,15 @@ def test_bulk_data_in_every_form(tmp_path, kind, order, form):
             load_mesh(path)
 
 
+def test_bulk_data_under_any_name_and_with_nodes_that_are_zero(tmp_path):
+    """A file .dat may be of Nastran or Tecplot; a node 0 within an edge is none."""
+    (tmp_path / "a.dat").write_text("SOL 101\nCEND\nBEGIN BULK\n" + PLATE + "ENDDATA\n")
+    check(tmp_path / "a.dat", "7", 1, {}, 4)
+    solid = CARDS.replace("CTETRA,1,7,1,2,3,4", "CTETRA,1,7,1,2,3,4,0,0\n,0,0,0,0")
+    (tmp_path / "a.bdf").write_text(solid + "ENDDATA\n")
+    check(tmp_path / "a.bdf", "7", 1 / 6, {}, 4)
+
+
 def test_bricks_of_27_nodes_in_any_order_of_their_middles(tmp_path):
     """Gmsh and Abaqus number the middles of the sides and of the brick in orders of their own."""
     shape, rng = block("hex", 2, (2, 1, 1)), np.random.default_rng(0)
@@ -202,6 +211,16 @@ PLATE += "CQUAD,1,7,1,2,3,4\n"
         ("a.bdf", PLATE + "PSHELL,7,1\nENDDATA", ""),
         ("a.bdf", PLATE + "PSHELL,7,1,2.5\nENDDATA", "a.bdf, line 5: the thickness 2.5 of 1"),
         ("a.inp", ONE + "*REBAR, ELEMENT=CONTINUUM\nB,1", "a.inp, line 8: the stiffness of *REBAR"),
+        (
+            "a.inp",
+            ONE + 2 * "*EQUATION\n2\n1,1,1.,2,1,-1.\n",
+            "a.inp, line 8: the stiffness of *EQUATION is left out",
+        ),
+        (
+            "a.bdf",
+            PLATE + "RBE2,9,1,123,2\nMPC,1,3,1,1.,4,1,-1.\nENDDATA",
+            "a.bdf: elements and links without extent are left out: MPC, RBE2",
+        ),
         ("a.bdf", CARDS + "PSOLID,7,1\nENDDATA", ""),
         (
             "a.bdf",

@@ -162,6 +162,9 @@ MEANT = {
         "9,2,21,3,6,22,7\n*SURFACE, NAME=T\nW, S3\n" + RIGHT,
         1, {"S": 1}, 8,
     ),
+    "elements that are none": (
+        ONE + RIGHT + "*ELEMENT, TYPE=CPE4R\n*ELEMENT, TYPE=B32\n", 1, {"S": 1}, 4,
+    ),
     "elements before nodes": (
         "*ELEMENT, TYPE=CPE4, ELSET=B\n1,1,2,3,4\n*NSET,NSET=S\n1,2\n" + SQUARE, 1, {"S": 1}, 4,
     ),

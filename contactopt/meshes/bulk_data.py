@@ -4,8 +4,9 @@ meshio reads no file without BEGIN BULK, such as those of Gmsh, nor elements in 
 passes over cards and coordinate systems that it does not know. A card has fields between commas, or
 of 8 or 16 characters (a name with *); it goes on in lines that begin with +, * or an empty field,
 which may stand elsewhere if they begin with the mark at its end.
-Elements without an extent are passed over. A card of an element that is not known is refused, as is
-a node in a coordinate system of its own. The number of its property names the group of an element.
+Elements and links without an extent are passed over. A card of an element that is not known is
+refused, as is a node in a coordinate system of its own. The number of its property names the group
+of an element.
 
 Source: MSC Nastran, Quick Reference Guide, "Bulk data entries".
 """
@@ -42,7 +43,8 @@ SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM")  # whose cards end with their n
 # the first node of a card: these have no property
 FIRST = {"PLOTEL": 2, "CONROD": 2}
 POINTS = re.compile(
-    "CELAS|CDAMP|CMASS|CBUSH|CGAP|CVISC|CONM[12]|CFAST|CWELD|CBEAR|CSEAM|CHBDY|CMBUSH"
+    "CELAS|CDAMP|CMASS|CBUSH|CGAP|CVISC|CONM[12]|CFAST|CWELD|CBEAR|CSEAM|CHBDY|CMBUSH|MPC$"
+    "|RBE[123]|RBAR|RROD|RTRPLT|RSPLINE|RSSCON|RJOINT"
 )
 # cards with such a first letter that are no elements
 HARMLESS = re.compile(
@@ -60,6 +62,11 @@ Card = tuple[int, list[str]]  # line and fields
 log = logging.getLogger(__name__)
 
 
+def is_bulk_data(path: Path) -> bool:
+    """Whether a file begins its bulk data, or lists nodes as bulk data do."""
+    return re.search(rb"^\s*(BEGIN\s+BULK|GRID[ \t*,])", path.read_bytes(), re.M | re.I) is not None
+
+
 def read_bulk_data(path: Path) -> Any:
     """The mesh of a file, with properties as groups; InputError names a line, else Damaged."""
     import meshio
@@ -68,7 +75,8 @@ def read_bulk_data(path: Path) -> Any:
     for line, card in _cards(path):
         reader.take(line, card)
     if reader.passed:
-        log.warning("%s: elements without extent are left out: %s", path, ", ".join(reader.passed))
+        said = "%s: elements and links without extent are left out: %s"
+        log.warning(said, path, ", ".join(sorted(reader.passed)))
     tags = np.array(sorted(reader.nodes), dtype=np.int64)
     if not len(tags) or not reader.elements:
         raise Damaged("it holds no nodes or no elements")
@@ -161,12 +169,12 @@ class _Reader:
     def _element(self, line: int, card: list[str]) -> None:
         name, first = card[0], FIRST.get(card[0], 3)
         shapes = ELEMENTS[name]
-        words = card[first : first + max(shapes)]
+        words = ["" if word == "0" else word for word in card[first : first + max(shapes)]]
         count = next(n for n in sorted(shapes) if not any(words[n:]))
         if len(words) < count or not all(words[:count]):
             raise self.fail(line, f"the element {name} lacks some of its nodes")
         nodes = [self.whole(line, word) for word in words[:count]]
-        if name in SOLIDS and any(card[first + count :]):
+        if name in SOLIDS and any(word.strip("0") for word in card[first + count :]):
             raise self.fail(line, f"the element {name} has more than {count} nodes")
         number = self.whole(line, card[1])
         if number in self.numbers:
@@ -222,7 +230,8 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str], str]]:
             return
         if line:
             yield number, fields, end
-    raise InputError(f"mesh file '{path}', line {len(lines)}: it ends before ENDDATA.")
+    said = "it ends before ENDDATA; add this line if nothing is missing"
+    raise InputError(f"mesh file '{path}', line {len(lines)}: {said}.")
 
 
 def _fields(line: str) -> tuple[list[str], str]:

@@ -29,17 +29,7 @@ from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
 from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of, words_of
-from contactopt.meshes.inp_text import (
-    LARGEST,
-    SECTIONS,
-    THICK,
-    Block,
-    Later,
-    Named,
-    bare,
-    blocks,
-    set_of,
-)
+from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Later, Named, bare, blocks, set_of
 from contactopt.meshes.mesh_repair import in_order
 
 log = logging.getLogger(__name__)
@@ -105,13 +95,6 @@ def read_inp(path: Path) -> Any:
 
 def _places(ids: np.ndarray, found: Iterable[int]) -> np.ndarray:
     return np.flatnonzero(np.isin(ids, np.fromiter(found, np.int64)))
-
-
-def _thickness(block: Block) -> float:
-    """The number below a section of plane elements, 1 without one."""
-    plain = block.keyword in THICK and "composite" not in block.options
-    first = [(line, words[0]) for line, words in block.rows if plain and words[0]]
-    return block.real(*first[0]) if first else 1.0
 
 
 def _instance(parts: dict[str, Scope], block: Block) -> Scope:
@@ -255,7 +238,7 @@ class Scope:
                 if many and 0 < dimension(self.types[place]) < most:
                     said = "the stiffness of %s %s is left out"
                     block.warn(said, count(many, "element"), self.types[place])
-                elif many and most == 2 and (depth := _thickness(block)) != 1:
+                elif many and most == 2 and (depth := block.thickness()) != 1:
                     said = "the thickness %g of %s %s is left out; give it to the scene"
                     block.warn(said, depth, count(many, "element"), self.types[place])
 
@@ -302,7 +285,7 @@ class Scope:
                 raise block.fail(f"an element {named} has a number and {nodes} nodes", line)
         if kind and rows and len(rows[-1]) < 1 + nodes:
             raise block.fail(f"an element {named} lacks some of its {nodes} nodes", where[-1][1])
-        width = max((len(row) for row in rows), default=1)
+        width = max((len(row) for row in rows), default=1 + nodes)
         table = np.array([row + [0] * (width - len(row)) for row in rows], dtype=np.int64)
         table = table.reshape(-1, width)
         if kind == "line3":  # the middle is in the middle here, and at the end in meshio

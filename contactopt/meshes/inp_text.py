@@ -41,7 +41,9 @@ READ = {
 # keywords that give elements a stiffness, with any options
 THICK = {"membranesection", "shellsection", "solidsection"}  # the first number below is a thickness
 SECTIONS = THICK | {"beamsection", "beamgeneralsection", "framesection", "shellgeneralsection"}
-STIFFENING = {"foundation", "rebar", "rebarlayer"}  # keywords of what elements do not show
+# keywords of what elements do not show, foundations and links between nodes
+STIFFENING = {"foundation", "rebar", "rebarlayer", "equation", "mpc", "coupling", "rigidbody"}
+STIFFENING |= {"kinematiccoupling", "distributingcoupling", "embeddedelement"}
 DEEPEST = 10  # files that include each other
 LARGEST = 2**31  # numbers of nodes, elements and lines are smaller
 OPEN = "a quotation mark is not closed"
@@ -59,6 +61,7 @@ class Source:
 
     files: list[Path]
     depths: list[int]  # how many files include each
+    told: set[str] = field(default_factory=set)  # keywords of which a warning was given
 
     def open(self, path: Path, depth: int) -> list[tuple[int, str]]:
         """The lines of another file, the last one first, by their numbers."""
@@ -123,6 +126,12 @@ class Block:
             why = "is no number" if math.isnan(value) else f"is not below {FAR:g}"
             raise self.fail(f"{word[:40]!r} {why}", place)
         return value
+
+    def thickness(self) -> float:
+        """The number below a section of elements in the plane or of shells, 1 without one."""
+        plain = self.keyword in THICK and "composite" not in self.options
+        first = [(line, words[0]) for line, words in self.rows if plain and words[0]]
+        return self.real(*first[0]) if first else 1.0
 
 
 Named = dict[int, tuple[Block, int] | None]  # numbers, each with where it is named if it must exist
@@ -189,7 +198,8 @@ def _known(block: Block, stepping: bool) -> Iterator[Block]:
     if block.keyword in SECTIONS:
         yield block
         return
-    if block.keyword in STIFFENING:
+    if block.keyword in STIFFENING and block.keyword not in block.source.told:
+        block.source.told.add(block.keyword)
         block.warn("the stiffness of *%s is left out", block.keyword.upper())
     if block.keyword == "modelchange" and block.options.get("type", "element").lower() == "element":
         raise block.fail("*MODEL CHANGE of elements is not read; write the mesh that is meant")

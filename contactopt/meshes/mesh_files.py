@@ -203,8 +203,8 @@ def _elements(
     if other or len(found) != 1:
         kinds = {name: _kinds(groups, name, dim) for name in groups.names(dim) if group is None}
         pure = [name for name, own in kinds.items() if len(own) == 1 and own <= CORNERS.keys()]
-        fault = f"elements of type {groups.words.get(other, repr(other))} cannot be used; make triangles,"
-        fault += " quadrilaterals, tetrahedra or hexahedra of first or second order"
+        fault = f"elements of type {groups.words.get(other, repr(other))} cannot be used; make"
+        fault += " triangles, quadrilaterals, tetrahedra or hexahedra of first or second order"
         if not other:
             words = " and ".join(groups.words.get(kind, kind) for kind in found)
             fault = f"the body mixes elements of type {words}; make all of one type"

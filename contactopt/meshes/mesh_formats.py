@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import Damaged, InputError
-from contactopt.meshes.bulk_data import read_bulk_data
+from contactopt.meshes.bulk_data import is_bulk_data, read_bulk_data
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
 from contactopt.meshes.med import read_med
@@ -86,8 +86,8 @@ def read_groups(path: Path) -> FileGroups:
     """
     mesh = _read(path)
     blocks = tuple((block.type, np.asarray(block.data), int(block.dim)) for block in mesh.cells)
-    if not any(len(nodes) for _, nodes, _ in blocks):
-        raise InputError(f"mesh file '{path}': it holds no elements.")
+    if not any(len(nodes) for _, nodes, _ in blocks) or np.ndim(mesh.points) != 2:
+        raise InputError(f"mesh file '{path}': it holds no elements, or no nodes.")
     for kind, nodes, _ in blocks:
         if nodes.size and (nodes.min() < 0 or nodes.max() >= len(mesh.points)):
             raise InputError(f"mesh file '{path}': a {kind} names a node that is not there.")
@@ -106,7 +106,9 @@ def read_groups(path: Path) -> FileGroups:
     numbered = {k: value for k, value in mesh.field_data.items() if np.shape(value) == (2,)}
     named = {(int(tag), int(dim)): name for name, (tag, dim) in numbered.items()}
     for key, arrays in mesh.cell_data.items():
-        for i, values in enumerate(np.asarray(array) for array in arrays):
+        for i, array in enumerate(arrays):
+            values = np.asarray(array)
+            values = values[:, 0] if values.shape[1:] == (1,) else values
             if key == "gmsh:geometrical" or values.dtype.kind not in "iu" or values.ndim != 1:
                 continue
             for tag in np.unique(values):
@@ -145,6 +147,8 @@ def _read(path: Path) -> Any:
         )
     endings = ["".join(path.suffixes[-n:]).lower() for n in range(len(path.suffixes), 0, -1)]
     formats = [name for ending in endings for name in meshio.extension_to_filetypes.get(ending, ())]
+    if path.suffix.lower() == ".dat" and is_bulk_data(path):
+        formats = ["nastran"]
     if not formats:
         raise InputError(
             f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp"

@@ -84,8 +84,8 @@ def read_msh2(path: Path) -> Any:
         for tag in np.unique(rows[rows[:, 0] > 0, 0]).tolist():
             name = names.get((_dimension_of(kind), tag), str(tag))
             none = [np.arange(0) for _ in table]
-            own = sets.setdefault(name, none)  # groups may share a name
-            own[i] = np.append(own[i], np.flatnonzero(rows[:, 0] == tag))
+            parts = sets.setdefault(name, none)  # groups may share a name
+            parts[i] = np.append(parts[i], np.flatnonzero(rows[:, 0] == tag))
     return _mesh(points, tags, [(kind, rows[:, 1:]) for kind, rows in table.items()], sets)
 
 
