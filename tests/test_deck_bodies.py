@@ -9,6 +9,7 @@ from deck_shapes import block, bulk_data, element_rows, node_rows, scattered
 from test_decks import BRICK, FACE, GROWN, ONE, SQUARE, check, measure
 
 from contactopt import Material, Part, Rigid, Scene, Support, Traction, run
+from contactopt.cli import main
 from contactopt.errors import InputError
 from contactopt.meshes.mesh_files import load_mesh
 from contactopt.scenes.scene_files import read_scene_file
@@ -241,6 +242,21 @@ def test_what_stiffens_no_body_is_told_in_every_run_with_the_mesh(tmp_path, name
     remarks = run(Scene("one", part, Rigid("floor"), 0.0, kind=kind)).summary["remarks"]
     of_the_file = [text for text in remarks if str(tmp_path) in text]
     assert [text.startswith(f"{tmp_path}/{told}") for text in of_the_file] == [True] * bool(told)
+
+
+@pytest.mark.parametrize(("element", "kind"), [("CAX4", "axisymmetric"), ("CPS4", "plane-strain")])
+def test_a_deck_of_axisymmetric_elements_makes_axisymmetric_scenes(tmp_path, capsys, element, kind):
+    """The beginning of a scene has the kind of the deck, and a scene of another kind a remark."""
+    path = tmp_path / "a.inp"
+    path.write_text(ONE.replace("CPE4", element) + "*SURFACE, NAME=S\n1, S1\n")
+    assert main(["mesh", str(path), "--no-page"]) == 0
+    assert capsys.readouterr().out.startswith(f'kind = "{kind}"')
+    part = Part("ring", load_mesh(path), Material(1, 0), (), (), "S")
+    for other in ("axisymmetric", "plane-strain"):
+        scene = Scene("one", part, Rigid("floor"), 0.0, kind=other)
+        remarks = " ".join(run(scene, figures=()).summary["remarks"])
+        told = other != "axisymmetric" and element == "CAX4"
+        assert ("CAX4 (line 7) are axisymmetric, and the scene is not" in remarks) == told
 
 
 @pytest.mark.parametrize(("at", "said"), [(0, True), (1, False)])

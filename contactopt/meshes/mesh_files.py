@@ -14,7 +14,7 @@ import numpy as np
 import skfem
 
 from contactopt.cards import count
-from contactopt.checks import LARGEST, check_number, overheard, place_words, remember
+from contactopt.checks import LARGEST, RINGS, check_number, overheard, place_words, remember
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import facets_at
@@ -57,7 +57,7 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     with overheard() as told:
         groups = read_groups(Path(path))
         _tell_others(Path(path), groups)
-        return remember(_body(Path(path), groups, group, scale), told)
+        return remember(_body(Path(path), groups, group, scale), told + _rings(Path(path), groups))
 
 
 def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
@@ -81,10 +81,16 @@ def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
             refused.append(f"group {group!r} is {how} {larger!r}")
             continue
         try:
-            found[group] = _body(path, groups, group, 1.0)
+            found[group] = remember(_body(path, groups, group, 1.0), _rings(path, groups))
         except InputError as error:
             refused.append(f"group {group!r}: {error}" if group else str(error))
     return {group: found[group] for group in names if group in found}, refused
+
+
+def _rings(path: Path, groups: FileGroups) -> list[str]:
+    """A remark for scenes that are not axisymmetric where the elements of the file are."""
+    own = [word for word in groups.words.values() if word.startswith(("CAX", "CGAX", "DCAX"))]
+    return [f"{path}: elements of type {own[0]} {RINGS}"] if own else []
 
 
 def _numbers(members: Mapping[int, np.ndarray]) -> np.ndarray:
