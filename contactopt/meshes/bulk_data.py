@@ -21,6 +21,7 @@ import numpy as np
 
 from contactopt.cards import count
 from contactopt.errors import Damaged, InputError
+from contactopt.meshes.exodus import HEXAHEDRON
 from contactopt.meshes.inp_elements import CORNERS
 from contactopt.meshes.inp_text import text_of
 
@@ -56,8 +57,6 @@ HARMLESS = re.compile(
 UNKNOWN = re.compile("C|E?GRID|HEX|INCLUDE|PENTA|PLOT|PYR|QUAD|TETRA|TRIA|(?![A-Z][A-Z0-9]*$)")
 # properties that give shells and lines a stiffness
 SECTIONS = re.compile("P(BAR|BEAM|COMP|ROD|SHEAR|SHELL|TUBE)")
-# the order of meshio: edges along the third axis come last
-HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15]
 Card = tuple[int, list[str]]  # line and fields
 log = logging.getLogger(__name__)
 
@@ -91,7 +90,7 @@ def read_bulk_data(path: Path) -> Any:
             said = f"an element names node {number}, which is not there"
             raise reader.fail(rows[lost[0, 0]][0], said)
         if kind == "hexahedron20":
-            nodes = nodes[:, HEXAHEDRON]
+            nodes = nodes[:, HEXAHEDRON[:20]]
         cells.append((kind, np.searchsorted(tags, nodes[:, : CORNERS.get(kind)])))
         groups.append(np.array([group for _, group, _ in rows], dtype=np.int64))
     return meshio.Mesh(points, cells, cell_data={"nastran:ref": groups}, info=reader.words)

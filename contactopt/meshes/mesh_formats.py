@@ -20,6 +20,7 @@ import numpy as np
 
 from contactopt.errors import Damaged, InputError
 from contactopt.meshes.bulk_data import is_bulk_data, read_bulk_data
+from contactopt.meshes.cad import ENDINGS
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
 from contactopt.meshes.med import read_med
@@ -118,17 +119,14 @@ def read_groups(path: Path) -> FileGroups:
                 for name in own if tag != 0 or key not in TAGS else ():
                     add(name, i, np.flatnonzero(values == tag))
     sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
-    for name, found in sets.items():
-        if found.size and (found.min() < 0 or found.max() >= len(mesh.points)):
-            raise InputError(
-                f"mesh file '{path}': the set {name!r} names a node that is not there."
-            )
+    named_by = [(name, found, "a node", len(mesh.points)) for name, found in sets.items()]
     for (name, _), parts in members.items():
-        for i, found in parts.items():
-            if found.min() < 0 or found.max() >= len(blocks[i][1]):
-                raise InputError(
-                    f"mesh file '{path}': the set {name!r} names an element that is not there."
-                )
+        named_by += [(name, own, "an element", len(blocks[i][1])) for i, own in parts.items()]
+    for name, found, what, size in named_by:
+        if found.size and (found.min() < 0 or found.max() >= size):
+            raise InputError(
+                f"mesh file '{path}': the set {name!r} names {what} that is not there."
+            )
     return FileGroups(np.asarray(mesh.points), blocks, members, sets, mesh.info or {})
 
 
@@ -150,10 +148,10 @@ def _read(path: Path) -> Any:
     if path.suffix.lower() == ".dat" and is_bulk_data(path):
         formats = ["nastran"]
     if not formats:
-        raise InputError(
-            f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp"
-            " (Abaqus, CalculiX), ..."
-        )
+        what = "it is a part of a CAD program, of which `contactopt mesh` makes a mesh"
+        if path.suffix.lower() not in ENDINGS:
+            what = "its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus), ..."
+        raise InputError(f"mesh file '{path}': {what}.")
     said = ""
     for reader in _readers(path, formats, size):
         printed = io.StringIO()
@@ -187,6 +185,8 @@ def _words(error: BaseException, printed: str) -> str:
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[], Any]]:
     """The reader of each attempt."""
+    import meshio
+
     stated = version(path)[0] if "gmsh" in formats else None
     if stated is not None:
         if stated != "4.1" and stated.partition(".")[0] != "2":
@@ -200,15 +200,9 @@ def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[],
         if name in OWN and path.suffix != ".meshb":
             yield partial(OWN[name], path)
         elif name in SAFE:
-            yield partial(_read_here, path, name, size)
+            yield partial(meshio.read, path, file_format=name)
         else:
             yield partial(_read_apart, path, name, size)
-
-
-def _read_here(path: Path, name: str, size: int) -> Any:
-    import meshio
-
-    return meshio.read(path, file_format=name)
 
 
 def _read_apart(path: Path, name: str, size: int) -> Any:
