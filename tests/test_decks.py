@@ -191,7 +191,8 @@ MEANT = {
     ),
     "words after another": (
         ONE + RIGHT + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nN,20.\n*TIE, NAME=T\nS,S\n*TRANSFORM,"
-        "NSET=N,TYPE=C\n0,0,0,0,0,1\n*ORIENTATION,NAME=O\n1,0,0,0,1,0\n*AMPLITUDE,NAME=A\n0,0,1,1\n",
+        "NSET=N,TYPE=C\n0,0,0,0,0,1\n*ORIENTATION,NAME=O\n1,0,0,0,1,0\n*AMPLITUDE,NAME=A\n0,0,1,1\n"
+        "*SURFACE SMOOTHING,NAME=T\n*ADAPTIVE MESH CONTROLS, NAME=C\n1., 0., 0.\n",
         1, {"S": 1}, 4,
     ),
 }  # fmt: skip
@@ -208,7 +209,7 @@ def test_a_keyword_means_what_the_manual_says(tmp_path, name):
 # what is written, the line of the fault, and words of the message
 REFUSED = {
     "unknown keyword": (ONE + "*NMAP, NSET=A\n1\n", 8, "NMAP"),
-    "a word with a slip": (ONE + "*NSETT, NSET=A\n1\n", 8, "NSETT"),
+    "a word with a slip": (ONE + "*Nset T, NSET=A\n1\n", 8, "the keyword *NSET T is not known"),
     "parameters": ("*PARAMETER\na=1\n" + ONE, 1, "PARAMETER"),
     "unknown option": (ONE.replace("ELSET=B", "ELSET=B, OFFSET=10"), 6, "OFFSET"),
     "sphere": (ONE.replace("*NODE", "*NODE, SYSTEM=S"), 1, "SYSTEM=S"),

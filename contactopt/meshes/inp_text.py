@@ -80,7 +80,7 @@ class Block:
 
     source   the files of the deck;  place  of the keyword in it
     keyword  in lower case, without blanks;  options  value by name
-    rows     the rows of data, each with its place
+    rows     the rows of data, each with its place;  title  the keyword as messages name it
     """
 
     source: Source
@@ -88,6 +88,7 @@ class Block:
     keyword: str
     options: dict[str, str]
     rows: list[Row] = field(default_factory=list)
+    title: str = ""
 
     def fail(
         self, message: str, place: int | None = None, error: type[InputError] = InputError
@@ -104,7 +105,7 @@ class Block:
     def need(self, option: str) -> str:
         """The value of an option that must be there."""
         if not self.options.get(option):
-            raise self.fail(f"*{self.keyword.upper()} lacks the option {option.upper()}=")
+            raise self.fail(f"*{self.title} lacks the option {option.upper()}=")
         return self.options[option]
 
     def whole(self, place: int, word: str) -> int:
@@ -161,7 +162,7 @@ def blocks(path: Path) -> Iterator[Block]:
         first, *words = _words(text[1:])
         pairs = (word.partition("=") for word in words if word)
         options = {bare(key): value.strip().strip('"').strip() for key, _, value in pairs}
-        found = Block(source, place, bare(first), options)
+        found = Block(source, place, bare(first), options, title=first.upper())
         if found.keyword == "include":  # its data may be those of the block before
             lines += _other(found)
             continue
@@ -200,13 +201,13 @@ def _known(block: Block, stepping: bool) -> Iterator[Block]:
         return
     if block.keyword in STIFFENING and block.keyword not in block.source.told:
         block.source.told.add(block.keyword)
-        block.warn("the stiffness of *%s is left out", block.keyword.upper())
+        block.warn("the stiffness of *%s is left out", block.title)
     if block.keyword == "modelchange" and block.options.get("type", "element").lower() == "element":
         raise block.fail("*MODEL CHANGE of elements is not read; write the mesh that is meant")
     if block.keyword not in READ:
         if not stepping and block.keyword not in harmless():
             raise block.fail(
-                f"the keyword *{block.keyword.upper()} is not known here, and the mesh may"
+                f"the keyword *{block.title} is not known here, and the mesh may"
                 " depend on it; write the mesh without it"
             )
         return
@@ -223,7 +224,7 @@ def _check_options(block: Block) -> None:
     for option in block.options:
         if option not in READ[block.keyword].split():
             raise block.fail(
-                f"the option {option.upper()} of *{block.keyword.upper()} is not known here; write"
+                f"the option {option.upper()} of *{block.title} is not known here; write"
                 " the mesh without it"
             )
 
