@@ -150,7 +150,7 @@ def _read(path: Path) -> Any:
     if not formats:
         what = "it is a part of a CAD program, of which `contactopt mesh` makes a mesh"
         if path.suffix.lower() not in ENDINGS:
-            what = "its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp (Abaqus), ..."
+            what = "its ending names no format of meshio; use .msh, .vtu or .inp, for example"
         raise InputError(f"mesh file '{path}': {what}.")
     said = ""
     for reader in _readers(path, formats, size):
