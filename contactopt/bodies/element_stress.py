@@ -79,15 +79,13 @@ def nodal_stress(
     volume = basis.dx.sum(axis=1)
     shape = SHAPES[mesh.refdom.__name__][1][body.degree if everywhere else 1]()
     if body.degree == 1:
-        stress = stress_in(body, basis, U) if stress is None else stress
+        stress = stress_in(body, U, basis.X) if stress is None else stress
         element = np.sum(stress * basis.dx, axis=3) / volume
         values = np.repeat(element[..., None], len(mesh.t), axis=3)
     else:
-        places = shape.doflocs.T
         blocks = np.array_split(np.arange(mesh.nelements), -(-mesh.nelements // BLOCK))
-        rule = places, np.ones(places.shape[1])
-        bases = (skfem.Basis(mesh, basis.elem, elements=block, quadrature=rule) for block in blocks)
-        values = np.concatenate([stress_in(body, at, U) for at in bases], axis=2)
+        stresses = [stress_in(body, U, shape.doflocs.T, block) for block in blocks]
+        values = np.concatenate(stresses, axis=2)
     nodes = skfem.Dofs(mesh, shape).element_dofs  # numbered as the nodes are
     where, count = nodes.T.ravel(), int(nodes.max()) + 1
     weight = np.bincount(where, np.repeat(volume, len(nodes)), count)
@@ -114,18 +112,14 @@ def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple
     Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical
     engineering analysis.
     """
-    basis, mesh = body.basis, straight(body.basis.mesh)
-    vertices = skfem.Basis(
-        mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W)
-    )
+    basis, corners = body.basis, body.basis.mesh.t
+    vertex = SHAPES[basis.mesh.refdom.__name__][1][1]()
+    hats = [vertex.lbasis(basis.X, i)[0] for i in range(len(corners))]
 
     def missing(field: np.ndarray) -> np.ndarray:
-        stress = stress_in(body, basis, field)
+        stress = stress_in(body, field, basis.X)
         nodal = nodal_stress(body, field, False, stress)
-        smooth = sum(
-            nodal[:, :, own][..., None] * np.asarray(shape[0])
-            for own, shape in zip(mesh.t, vertices.basis)
-        )
+        smooth = sum(nodal[:, :, own][..., None] * hat for own, hat in zip(corners, hats))
         return np.asarray(smooth - stress)
 
     measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
@@ -153,26 +147,30 @@ def added_work(
     basis = body.basis
     centre = np.asarray(basis.global_coordinates()).mean(axis=2)
     measure, found = volumes * weight_at(body.weight, centre), []
-    own = stress_in(body, basis, U).mean(axis=3)
+    own = stress_in(body, U, basis.X).mean(axis=3)
     for W in others:
-        stress = own if W is U else stress_in(body, basis, W).mean(axis=3)
+        stress = own if W is U else stress_in(body, W, basis.X).mean(axis=3)
         moved = np.sum(force(centre) * np.asarray(basis.interpolate(W)).mean(axis=2), axis=0)
         found.append(np.asarray((moved - _product(body, own, stress)) * measure))
     return tuple(found)
 
 
-def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
-    places, shape, dim = basis.X, basis.elem.elem, len(basis.mesh.p)
-    elements = slice(None) if basis.tind is None else basis.tind
+def stress_in(
+    body: Assembly, U: np.ndarray, places: np.ndarray, elements: np.ndarray | None = None
+) -> np.ndarray:
+    """Stress tensor (3, 3, elements, points) at reference places (dim, points) in elements (by
+    number; None: all of them).
+    """
+    basis, shape, dim = body.basis, body.basis.elem.elem, len(places)
+    some = slice(None) if elements is None else elements
     values, slopes = zip(*(shape.lbasis(places, i) for i in range(basis.Nbfun // dim)))
-    own = U[basis.element_dofs].reshape(len(values), dim, -1)
-    mapping = with_jacobians(basis.mapping, places, elements)
+    own = U[basis.element_dofs[:, some]].reshape(len(values), dim, -1)
+    mapping = with_jacobians(basis.mapping, places, some)
     local = np.einsum("iae,ibq->abeq", own, np.stack(slopes), optimize=True)
-    inverse = np.asarray(mapping.invDF(places, tind=basis.tind))
+    inverse = np.asarray(mapping.invDF(places, tind=elements))
     gradient, hoop = np.einsum("abeq,bceq->aceq", local, inverse), None
     if body.weight[1]:  # u_r / r, on the axis its limit
-        r = np.asarray(basis.global_coordinates())[0]
+        r = np.asarray(mapping.F(places, tind=elements))[0]
         away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
         hoop = np.divide(own[:, 0].T @ np.stack(values), r, where=away, out=limit)
     return stress_of(body.kind.constants(body.material), gradient, hoop)

@@ -25,7 +25,6 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 import skfem
-from skfem.helpers import dot
 
 from contactopt.bodies.elements import Weight, node_unknowns, weight_at
 from contactopt.defaults import EQUAL, ROUNDED
@@ -132,12 +131,13 @@ def _name(column: np.ndarray, labels: tuple[str, ...]) -> str:
 
 def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.ndarray:
     """Nodal forces (n,) of the field as a force per volume."""
-
-    @skfem.LinearForm
-    def form(v, w):  # type: ignore[no-untyped-def]
-        return dot(w["field"], v) * weight_at(weight, w.x)
-
-    return np.asarray(form.assemble(basis, field=basis.interpolate(field)))
+    count = basis.Nbfun // len(basis.mesh.p)
+    N = np.stack([basis.elem.elem.lbasis(basis.X, i)[0] for i in range(count)])
+    x = np.asarray(basis.global_coordinates()) if weight[1] else np.zeros(1)
+    own = field[basis.element_dofs].reshape(count, -1, basis.mesh.nelements)
+    force = np.einsum("iq,iae->aeq", N, own, optimize=True) * basis.dx * weight_at(weight, x)
+    nodal = np.einsum("iq,aeq->iae", N, force, optimize=True)
+    return np.bincount(basis.element_dofs.ravel(), nodal.ravel(), basis.N)
 
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
