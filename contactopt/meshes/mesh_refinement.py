@@ -179,10 +179,10 @@ def bent(mesh: Mesh, curves: Curves) -> Any:
     flat = knowing(replace(mesh, _boundaries=None, _subdomains=None), mesh)
     made = knowing(CURVED[mesh.refdom.__name__].from_mesh(flat), flat)
     shift, plane = np.zeros_like(made.doflocs), len(mesh.p) == 2
-    edges = mesh.facets if plane else mesh.edges
+    edges = flat.facets if plane else flat.edges
     middle = (made.dofs.facet_dofs if plane else made.dofs.edge_dofs)[0]
     for facets, curve in known.values():
-        mine = facets if plane else np.unique(mesh.f2e[:, facets])
+        mine = facets if plane else np.unique(flat.f2e[:, facets])
         ends = mesh.p[:, edges[:, mine]]
         _shift(shift, middle[mine], ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=0), curve)
     # the node within a face or an element follows those around it
