@@ -30,7 +30,8 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0
     rounding = ROUNDED * float((abs(body.A) @ np.abs(U)).sum())
     if applied <= least and size <= max(least, rounding):
         unbalanced = 0.0  # supports move the body as a whole: all forces are rounding
-    gradient = _middle_gradient(body.basis, U)
+    middle = body.basis.mesh.init_refdom().p.mean(axis=1, keepdims=True)
+    gradient = _gradient(body.basis, U, middle)[..., 0].transpose(2, 0, 1)
     turned = gradient.swapaxes(1, 2)
     strains = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(axis=1)
     mean = np.sqrt(np.average(strains**2, weights=np.sum(body.basis.dx, axis=1)))
@@ -45,14 +46,16 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0
     )
 
 
-def _middle_gradient(basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
-    """The gradient (elements, dim, dim) of a displacement in the middle of every element."""
-    middle = basis.mesh.init_refdom().p.mean(axis=1, keepdims=True)
-    shape, dim = basis.elem.elem, len(middle)
-    slopes = np.stack([shape.lbasis(middle, i)[1][:, 0] for i in range(basis.Nbfun // dim)])
-    own = U[basis.element_dofs].reshape(len(slopes), dim, -1)
-    inverse = np.asarray(basis.mapping.invDF(middle))[..., 0].transpose(2, 0, 1)
-    return np.einsum("aie,ak->eik", own, slopes) @ inverse
+def _gradient(
+    basis: skfem.CellBasis, U: np.ndarray, places: np.ndarray, elements: np.ndarray | None = None
+) -> np.ndarray:
+    """The gradient (dim, dim, elements, points) of a displacement, as for stress_in()."""
+    shape, some = basis.elem.elem, slice(None) if elements is None else elements
+    slopes = np.stack([shape.lbasis(places, i)[1] for i in range(basis.Nbfun // len(places))])
+    own = U[basis.element_dofs[:, some]].reshape(len(slopes), len(places), -1)
+    local = np.einsum("iae,ibq->abeq", own, slopes, optimize=True)
+    inverse = with_jacobians(basis.mapping, places, some).invDF(places, tind=elements)
+    return np.einsum("abeq,bceq->aceq", local, np.asarray(inverse))
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:
@@ -161,18 +164,14 @@ def stress_in(
     """Stress tensor (3, 3, elements, points) at reference places (dim, points) in elements (by
     number; None: all of them).
     """
-    basis, shape, dim = body.basis, body.basis.elem.elem, len(places)
+    gradient, hoop = _gradient(body.basis, U, places, elements), None
     some = slice(None) if elements is None else elements
-    values, slopes = zip(*(shape.lbasis(places, i) for i in range(basis.Nbfun // dim)))
-    own = U[basis.element_dofs[:, some]].reshape(len(values), dim, -1)
-    mapping = with_jacobians(basis.mapping, places, some)
-    local = np.einsum("iae,ibq->abeq", own, np.stack(slopes), optimize=True)
-    inverse = np.asarray(mapping.invDF(places, tind=elements))
-    gradient, hoop = np.einsum("abeq,bceq->aceq", local, inverse), None
     if body.weight[1]:  # u_r / r, on the axis its limit
-        r = np.asarray(mapping.F(places, tind=elements))[0]
+        own = U[body.basis.element_dofs[:: len(places), some]]
+        values = [body.basis.elem.elem.lbasis(places, i)[0] for i in range(len(own))]
+        r = np.asarray(body.basis.mapping.F(places, tind=elements))[0]
         away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
-        hoop = np.divide(own[:, 0].T @ np.stack(values), r, where=away, out=limit)
+        hoop = np.divide(own.T @ np.stack(values), r, where=away, out=limit)
     return stress_of(body.kind.constants(body.material), gradient, hoop)
 
 

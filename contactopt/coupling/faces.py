@@ -139,10 +139,6 @@ class Faces:
             tangents += x[:, None] * rate
         return place, tangents
 
-    def normals(self, face: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Outward unit normals (dim, m) on faces (m,) at reference coordinates (dim - 1, m)."""
-        return self.stretched(face, self.locations(face, at)[1])[0]
-
     def stretched(self, face: np.ndarray, tangents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Outward unit normals (dim, m) on faces (m,) with tangents (dim, dim - 1, m), and areas
         (m,) per area of the reference face.
@@ -232,7 +228,8 @@ def face_normals(surface: Faces) -> np.ndarray:
     """(dim, f) outward unit normals at the middle of every face."""
     middle = surface.places[:, : surface.corners].mean(axis=1)
     count = len(surface.faces)
-    return surface.normals(np.arange(count), np.repeat(middle[:, None], count, axis=1))
+    face, at = np.arange(count), np.repeat(middle[:, None], count, axis=1)
+    return surface.stretched(face, surface.locations(face, at)[1])[0]
 
 
 def cross(tangents: np.ndarray) -> np.ndarray:
