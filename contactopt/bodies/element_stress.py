@@ -6,7 +6,7 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.elements import weight_at, with_jacobians
+from contactopt.bodies.elements import interpolated, weight_at, with_jacobians
 from contactopt.bodies.fields import PLACES, Fields, Validity, von_mises
 from contactopt.defaults import ROUNDED
 from contactopt.meshes.cells import SHAPES, second_order, straight
@@ -153,7 +153,7 @@ def added_work(
     own = stress_in(body, U, basis.X).mean(axis=3)
     for W in others:
         stress = own if W is U else stress_in(body, W, basis.X).mean(axis=3)
-        moved = np.sum(force(centre) * np.asarray(basis.interpolate(W)).mean(axis=2), axis=0)
+        moved = np.sum(force(centre) * interpolated(basis, W).mean(axis=2), axis=0)
         found.append(np.asarray((moved - _product(body, own, stress)) * measure))
     return tuple(found)
 

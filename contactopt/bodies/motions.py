@@ -26,7 +26,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 import skfem
 
-from contactopt.bodies.elements import Weight, node_unknowns, weight_at
+from contactopt.bodies.elements import Weight, interpolated, nodal_forces, node_unknowns
 from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import Kind
@@ -84,7 +84,8 @@ def free_motions(kind: Kind, basis: skfem.CellBasis, held: np.ndarray, weight: W
         return Motions(Z, (), np.zeros(0, dtype=int), Z.copy())
     free = np.flatnonzero(~held)
     fixing = free[la.qr(Z[free].T, pivoting=True, mode="r")[1][: len(names)]]
-    inertia = np.stack([_inertia(basis, z, weight) for z in Z.T], axis=1)
+    forces = [nodal_forces(basis, interpolated(basis, z), weight) for z in Z.T]  # of inertia
+    inertia = np.stack(forces, axis=1)
     inertia[held] = 0.0
     return Motions(Z, names, np.sort(fixing), inertia @ np.linalg.inv(Z.T @ inertia))
 
@@ -127,17 +128,6 @@ def _name(column: np.ndarray, labels: tuple[str, ...]) -> str:
     size = np.abs(column)
     size = size * np.where(turning, 1e3, 1.0) * (size > 1e-3 * size.max())
     return labels[int(np.argmax(size))]
-
-
-def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.ndarray:
-    """Nodal forces (n,) of the field as a force per volume."""
-    count = basis.Nbfun // len(basis.mesh.p)
-    N = np.stack([basis.elem.elem.lbasis(basis.X, i)[0] for i in range(count)])
-    x = np.asarray(basis.global_coordinates()) if weight[1] else np.zeros(1)
-    own = field[basis.element_dofs].reshape(count, -1, basis.mesh.nelements)
-    force = np.einsum("iq,iae->aeq", N, own, optimize=True) * basis.dx * weight_at(weight, x)
-    nodal = np.einsum("iq,aeq->iae", N, force, optimize=True)
-    return np.bincount(basis.element_dofs.ravel(), nodal.ravel(), basis.N)
 
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:
