@@ -162,7 +162,7 @@ class _Reader:
                 log.warning(said, self.path, own[0][0], count(len(own), "element"), kind)
             for depth in {depth for _, depth in own} - {1.0} if thin == ("line",) else ():
                 lines = [line for line, value in own if value == depth]
-                said = "%s, line %d: the thickness %g of %s is left out; give it to the scene"
+                said = "%s, line %d: the thickness %g of %s is not read, that of the scene counts"
                 log.warning(said, self.path, lines[0], depth, count(len(lines), "element"))
 
     def _element(self, line: int, card: list[str]) -> None:

@@ -239,7 +239,7 @@ class Scope:
                     said = "the stiffness of %s %s is left out"
                     block.warn(said, count(many, "element"), self.types[place])
                 elif many and most == 2 and (depth := block.thickness()) != 1:
-                    said = "the thickness %g of %s %s is left out; give it to the scene"
+                    said = "the thickness %g of %s %s is not read, that of the scene counts"
                     block.warn(said, depth, count(many, "element"), self.types[place])
 
     def node(self, block: Block) -> None:
