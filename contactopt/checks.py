@@ -218,6 +218,7 @@ def overheard() -> Iterator[list[str]]:
         logger.removeHandler(handler)
 
 
+RINGS = "are axisymmetric, and the scene is not"  # the end of a remark on a mesh
 _TOLD: dict[int, tuple[str, ...]] = {}  # by the array of its nodes: copies of a mesh share it
 
 

@@ -15,7 +15,6 @@ COUPLED, DENSE = ("coupled", "multigrid"), ("dense", "superlu")
 @pytest.fixture
 def limited(monkeypatch):
     """Solves a scene by multigrid, with another way after so much work; the work of each check."""
-    pytest.importorskip("pyamg")
     work, check = [], Budget.check
     monkeypatch.setattr(Budget, "check", lambda own, now: (work.append(now), check(own, now))[1])
 

@@ -9,6 +9,7 @@ from deck_shapes import block, bulk_data, element_rows, node_rows, scattered
 from test_decks import BRICK, FACE, GROWN, ONE, SQUARE, check, measure
 
 from contactopt import Material, Part, Rigid, Scene, Support, Traction, run
+from contactopt.cli import main
 from contactopt.errors import InputError
 from contactopt.meshes.mesh_files import load_mesh
 from contactopt.scenes.scene_files import read_scene_file
@@ -111,6 +112,15 @@ def test_bulk_data_in_every_form(tmp_path, kind, order, form):
             load_mesh(path)
 
 
+def test_bulk_data_under_any_name_and_with_nodes_that_are_zero(tmp_path):
+    """A file .dat may be of Nastran or Tecplot; a node 0 within an edge is none."""
+    (tmp_path / "a.dat").write_text("SOL 101\nCEND\nBEGIN BULK\n" + PLATE + "ENDDATA\n")
+    check(tmp_path / "a.dat", "7", 1, {}, 4)
+    solid = CARDS.replace("CTETRA,1,7,1,2,3,4", "CTETRA,1,7,1,2,3,4,0,0\n,0,0,0,0")
+    (tmp_path / "a.bdf").write_text(solid + "ENDDATA\n")
+    check(tmp_path / "a.bdf", "7", 1 / 6, {}, 4)
+
+
 def test_bricks_of_27_nodes_in_any_order_of_their_middles(tmp_path):
     """Gmsh and Abaqus number the middles of the sides and of the brick in orders of their own."""
     shape, rng = block("hex", 2, (2, 1, 1)), np.random.default_rng(0)
@@ -143,6 +153,21 @@ def test_shells_that_are_no_side_of_a_body_are_told(tmp_path, caplog):
     (tmp_path / "deck.inp").write_text(BRICK + "\n" + FACE + fin)
     load_mesh(tmp_path / "deck.inp")
     assert "deck.inp: 1 shell off the sides and edges" in caplog.text
+    caplog.clear()
+    (tmp_path / "deck.inp").write_text(BRICK + "\n" + fin + "*SURFACE, NAME=F\n91, SPOS\n")
+    load_mesh(tmp_path / "deck.inp")
+    assert "deck.inp: 1 shell off the sides and edges" in caplog.text
+
+
+def test_cards_that_are_no_body_leave_it_as_it_is(tmp_path, caplog):
+    """Quadrilaterals of any order of the card CQUAD, rods without property, cards of contact."""
+    others = "CONROD,9,1,2,1,.1\nCONTACT,8,,2,3,0.2\nCONTPRM,,1.\nCREEP,1\nCORD2R,1,,0.,0.,0.\n"
+    (tmp_path / "a.bdf").write_text(PLATE + others + "ENDDATA\n")
+    check(tmp_path / "a.bdf", "7", 1, {}, 4)
+    assert not caplog.text
+    (tmp_path / "a.bdf").write_text(PLATE + "CONM2,9,1,,1.\nENDDATA\n")
+    check(tmp_path / "a.bdf", "7", 1, {}, 4)
+    assert "without extent are left out: CONM2" in caplog.text
 
 
 BAR = "*ELEMENT, TYPE={}, ELSET=BAR\n900,1,2\n901,1,{}\n"
@@ -152,6 +177,8 @@ CARDS = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\
 
 
 CARDS += "CTETRA,1,7,1,2,3,4\nCBAR,2,8,1,2\n"
+PLATE = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,1.,1.,0.\nGRID,4,,0.,1.,0.\n"
+PLATE += "CQUAD,1,7,1,2,3,4\n"
 
 
 @pytest.mark.parametrize(
@@ -177,7 +204,24 @@ CARDS += "CTETRA,1,7,1,2,3,4\nCBAR,2,8,1,2\n"
             "a.inp, line 8: the thickness 2 of 1 element CPE4",
         ),
         ("a.inp", ONE + "*SOLID SECTION, ELSET=B, MATERIAL=M\n1.", ""),
+        (
+            "a.inp",
+            ONE.replace("CPE4", "S4R") + "*SHELL SECTION, ELSET=B, MATERIAL=M\n2.5, 5",
+            "a.inp, line 8: the thickness 2.5 of 1 element S4R",
+        ),
+        ("a.bdf", PLATE + "PSHELL,7,1\nENDDATA", ""),
+        ("a.bdf", PLATE + "PSHELL,7,1,2.5\nENDDATA", "a.bdf, line 5: the thickness 2.5 of 1"),
         ("a.inp", ONE + "*REBAR, ELEMENT=CONTINUUM\nB,1", "a.inp, line 8: the stiffness of *REBAR"),
+        (
+            "a.inp",
+            ONE + 2 * "*EQUATION\n2\n1,1,1.,2,1,-1.\n",
+            "a.inp, line 8: the stiffness of *EQUATION is left out",
+        ),
+        (
+            "a.bdf",
+            PLATE + "RBE2,9,1,123,2\nMPC,1,3,1,1.,4,1,-1.\nENDDATA",
+            "a.bdf: elements and links without extent are left out: MPC, RBE2",
+        ),
         ("a.bdf", CARDS + "PSOLID,7,1\nENDDATA", ""),
         (
             "a.bdf",
@@ -198,6 +242,21 @@ def test_what_stiffens_no_body_is_told_in_every_run_with_the_mesh(tmp_path, name
     remarks = run(Scene("one", part, Rigid("floor"), 0.0, kind=kind)).summary["remarks"]
     of_the_file = [text for text in remarks if str(tmp_path) in text]
     assert [text.startswith(f"{tmp_path}/{told}") for text in of_the_file] == [True] * bool(told)
+
+
+@pytest.mark.parametrize(("element", "kind"), [("CAX4", "axisymmetric"), ("CPS4", "plane-strain")])
+def test_a_deck_of_axisymmetric_elements_makes_axisymmetric_scenes(tmp_path, capsys, element, kind):
+    """The beginning of a scene has the kind of the deck, and a scene of another kind a remark."""
+    path = tmp_path / "a.inp"
+    path.write_text(ONE.replace("CPE4", element) + "*SURFACE, NAME=S\n1, S1\n")
+    assert main(["mesh", str(path), "--no-page"]) == 0
+    assert capsys.readouterr().out.startswith(f'kind = "{kind}"')
+    part = Part("ring", load_mesh(path), Material(1, 0), (), (), "S")
+    for other in ("axisymmetric", "plane-strain"):
+        scene = Scene("one", part, Rigid("floor"), 0.0, kind=other)
+        remarks = " ".join(run(scene, figures=()).summary["remarks"])
+        told = other != "axisymmetric" and element == "CAX4"
+        assert ("CAX4 (line 7) are axisymmetric, and the scene is not" in remarks) == told
 
 
 @pytest.mark.parametrize(("at", "said"), [(0, True), (1, False)])

@@ -118,6 +118,10 @@ MEANT = {
         "1,1,2,3,4,5,6\n*ELEMENT, TYPE=B32, ELSET=S\n8,1,4,2\n",
         0.5, {"S": 1}, 3,
     ),
+    "a beam with its direction": (
+        BRICK + "\n*ELEMENT, TYPE=B31\n5,1,2,7\n*ELEMENT, TYPE=B32\n6,1,4,3,7\n" + RIGHT,
+        1, {"S": 1}, 8,
+    ),
     "skin of shells": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN, SPOS\n", 1, {"S": 1}, 8),
     "skin without a side": (BRICK + "\n" + FACE + "*SURFACE, NAME=S\nSKIN,\n", 1, {"S": 1}, 8),
     "all sides": (BRICK + "\n*SURFACE, NAME=S\nB\n", 1, {"S": 6}, 8),
@@ -158,6 +162,9 @@ MEANT = {
         "9,2,21,3,6,22,7\n*SURFACE, NAME=T\nW, S3\n" + RIGHT,
         1, {"S": 1}, 8,
     ),
+    "elements that are none": (
+        ONE + RIGHT + "*ELEMENT, TYPE=CPE4R\n*ELEMENT, TYPE=B32\n", 1, {"S": 1}, 4,
+    ),
     "elements before nodes": (
         "*ELEMENT, TYPE=CPE4, ELSET=B\n1,1,2,3,4\n*NSET,NSET=S\n1,2\n" + SQUARE, 1, {"S": 1}, 4,
     ),
@@ -184,7 +191,8 @@ MEANT = {
     ),
     "words after another": (
         ONE + RIGHT + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nN,20.\n*TIE, NAME=T\nS,S\n*TRANSFORM,"
-        "NSET=N,TYPE=C\n0,0,0,0,0,1\n*ORIENTATION,NAME=O\n1,0,0,0,1,0\n*AMPLITUDE,NAME=A\n0,0,1,1\n",
+        "NSET=N,TYPE=C\n0,0,0,0,0,1\n*ORIENTATION,NAME=O\n1,0,0,0,1,0\n*AMPLITUDE,NAME=A\n0,0,1,1\n"
+        "*SURFACE SMOOTHING,NAME=T\n*ADAPTIVE MESH CONTROLS, NAME=C\n1., 0., 0.\n",
         1, {"S": 1}, 4,
     ),
 }  # fmt: skip
@@ -201,7 +209,7 @@ def test_a_keyword_means_what_the_manual_says(tmp_path, name):
 # what is written, the line of the fault, and words of the message
 REFUSED = {
     "unknown keyword": (ONE + "*NMAP, NSET=A\n1\n", 8, "NMAP"),
-    "a word with a slip": (ONE + "*NSETT, NSET=A\n1\n", 8, "NSETT"),
+    "a word with a slip": (ONE + "*Nset T, NSET=A\n1\n", 8, "the keyword *NSET T is not known"),
     "parameters": ("*PARAMETER\na=1\n" + ONE, 1, "PARAMETER"),
     "unknown option": (ONE.replace("ELSET=B", "ELSET=B, OFFSET=10"), 6, "OFFSET"),
     "sphere": (ONE.replace("*NODE", "*NODE, SYSTEM=S"), 1, "SYSTEM=S"),

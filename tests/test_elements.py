@@ -101,7 +101,8 @@ def test_stiffness_is_the_weak_form_of_elasticity(kind, degree, cut):
 
     fine = skfem.Basis(body.basis.mesh, body.basis.elem, intorder=6)
     same = kind == "axisymmetric"  # 1/r: no rule is exact
-    expected = elasticity.assemble(body.basis if same else fine)
+    own = skfem.Basis(body.basis.mesh, body.basis.elem, quadrature=(body.basis.X, body.basis.W))
+    expected = elasticity.assemble(own if same else fine)
     assert abs(body.A - expected).max() <= 1e-12 * abs(expected).max()
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import skfem
 
 from contactopt import InputError, load_mesh
 from contactopt.meshes import mesh_formats
@@ -185,6 +186,54 @@ def test_formats_of_gmsh_hold_the_same_bricks(gmsh, tmp_path, caplog, order, ser
         assert not caplog.text
 
 
+def test_curved_lines_keep_their_ends_in_every_format(gmsh, tmp_path):
+    """Formats put the node in the middle of a line at its end, or between the two others."""
+    disc_in_plate(gmsh, tmp_path / "a.msh", 2, 2)
+    exact = 4 * np.pi / 2
+    for file, group, side in (
+        ("a.msh", "plate", "rim"), ("a.inp", "plate", "rim"), ("a.med", "plate", "rim"),
+        ("a.bdf", "2", "3"),
+    ):  # fmt: skip
+        gmsh.option.setNumber("Mesh.SaveElementTagType", 2)
+        gmsh.write(str(tmp_path / file))
+        mesh = load_mesh(tmp_path / file, group)
+        basis = skfem.FacetBasis(mesh, mesh.elem(), facets=mesh.boundaries[side], intorder=6)
+        length = skfem.Functional(lambda w: 1.0 + 0 * w.x[0]).assemble(basis)
+        assert length == pytest.approx(exact, rel=1e-3)
+
+
+def test_elements_that_cannot_be_used_are_named_as_the_file_names_them(gmsh, tmp_path):
+    """Bricks beside wedges: the refusal says what to look for, and which groups can be used."""
+    occ = gmsh.model.occ
+    flat = [(2, occ.addRectangle(0, 0, 0, 1, 1)), (2, occ.addRectangle(1, 0, 0, 1, 1))]
+    flat, _ = occ.fragment(flat[:1], flat[1:])
+    made = occ.extrude(flat, 0, 0, 1, [1], recombine=True)
+    occ.synchronize()
+    for number, body in enumerate((tag for dim, tag in made if dim == 3), 7):
+        gmsh.model.addPhysicalGroup(3, [body], number, name=f"body{number}")
+    gmsh.model.mesh.setTransfiniteSurface(flat[0][1])
+    gmsh.model.mesh.setRecombine(2, flat[0][1])
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+    gmsh.model.mesh.generate(3)
+    gmsh.option.setNumber("Mesh.SaveElementTagType", 2)
+    for file, word, group in (
+        ("a.msh", r"wedge \(number 6 of Gmsh\)", "body7"), ("a.inp", r"C3D6 \(line \d+\)", "body7"),
+        ("a.bdf", r"CPENTA \(line \d+\)", "7"), ("a.med", r"wedge \(PE6 of MED\)", "body7"),
+        ("a.su2", r"wedge \(number 13 of SU2\)", ""),
+    ):  # fmt: skip
+        gmsh.write(str(tmp_path / file))
+        said = f"elements of type {word} cannot be used; make"
+        said += f".*, or choose one of its groups: .*{group}" if group else ""
+        with pytest.raises(InputError, match=said):
+            load_mesh(tmp_path / file)
+        if group:
+            assert volume(load_mesh(tmp_path / file, group)) == pytest.approx(1)
+    medit = "MeshVersionFormatted 2 Dimension 3 Vertices 6 " + "0 0 1 0 " * 6
+    (tmp_path / "b.mesh").write_text(medit + "Prisms 1 1 2 3 4 5 6 1 End")
+    with pytest.raises(InputError, match=r"type wedge \(Prisms of Medit\) cannot be used"):
+        load_mesh(tmp_path / "b.mesh")
+
+
 def test_families_of_med_may_be_missing(gmsh, tmp_path):
     h5py = pytest.importorskip("h5py")
     disc_in_plate(gmsh, tmp_path / "a.msh", 3, 2)
@@ -219,6 +268,20 @@ def test_parametric_nodes_of_the_older_format_of_gmsh(gmsh, tmp_path):
     gmsh.write(str(tmp_path / "binary.msh"))
     with pytest.raises(InputError, match="parametric nodes"):
         load_mesh(tmp_path / "binary.msh", "disc")
+
+
+def test_groups_of_one_name_are_one(tmp_path):
+    """Two physical groups may share a name, in both formats."""
+    names = '$PhysicalNames\n2\n1 1 "low"\n1 2 "low"\n$EndPhysicalNames\n'
+    old = TEXT.replace("$Nodes", names + "$Nodes").replace("Elements\n3\n", "Elements\n4\n")
+    old = old.replace("3 1 2 8 1 1 2", "3 1 2 1 1 1 2\n4 1 2 2 1 2 3")
+    new = TEXT4.replace("$Entities\n0 0 1", names + "$Entities\n0 2 1").replace(
+        "1 0 0 0 1 1 0 1 7", "1 0 0 0 1 0 0 1 1 0\n2 1 0 0 1 1 0 1 2 0\n1 0 0 0 1 1 0 1 7"
+    )
+    lines = "3 4 1 4\n1 1 1 1\n3 1 2\n1 2 1 1\n4 2 3\n"
+    for text in (old, new.replace("$Elements\n1 2 1 2\n", "$Elements\n" + lines)):
+        (tmp_path / "a.msh").write_text(text)
+        assert len(load_mesh(tmp_path / "a.msh", "7").boundaries["low"]) == 2
 
 
 def test_partitioned_files_of_gmsh_are_refused(gmsh, tmp_path):

@@ -36,6 +36,20 @@ def test_sets_of_abaqus_and_numbers_without_names(tmp_path):
     assert load_mesh(path, "4").p[0].min() == 1
 
 
+def test_a_column_of_numbers_in_an_older_vtk_file_names_groups(tmp_path):
+    points = " ".join(str(x) for x in SQUARE.ravel())
+    (tmp_path / "a.vtk").write_text(
+        "# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 double\n"
+        f"{points}\nCELLS 2 10\n4 0 1 4 3\n4 1 2 5 4\nCELL_TYPES 2\n9\n9\nCELL_DATA 2\n"
+        "SCALARS part int 1\nLOOKUP_TABLE default\n3\n4\n"
+    )
+    assert load_mesh(tmp_path / "a.vtk", "part=4").p[0].min() == 1
+    text = (tmp_path / "a.vtk").read_text()
+    (tmp_path / "a.vtk").write_text(text.replace(f"POINTS 6 double\n{points}\n", ""))
+    with pytest.raises(InputError, match=r"no nodes|cannot be read"):
+        load_mesh(tmp_path / "a.vtk")
+
+
 def brick_of_twenty(height, first):
     """Lines of the nodes of a brick of second order, numbered from `first`."""
     corners = np.array(
@@ -228,8 +242,9 @@ def test_exodus_blocks_and_sides_that_are_not_known_are_refused(tmp_path):
         {"connect3": ([[41, 42, 43, 44]], "NSIDED")}, {"side_ss1": ([1, 7, 1], "")},
         {"elem_ss1": ([1, 2, 4], "")}, {"node_ns1": ([1, 2, 99], "")},
     ):  # fmt: skip
-        with pytest.raises(InputError, match=r"not known|not there"):
+        with pytest.raises(InputError, match=r"not known|not there") as caught:
             change(**values)
+        assert "damaged" not in str(caught.value) or "connect3" not in values
     low = change(connect3=([[1, 2, 3, 4]], "SHELL4"), elem_ss1=([3], ""), side_ss1=([2], ""))
     assert len(low.boundaries["tip"]) == len(low.boundaries["side 1"]) == 1
     assert flux(low, "tip") == pytest.approx(0) and volume(low) == pytest.approx(1)

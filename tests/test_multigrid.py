@@ -13,6 +13,7 @@ from contactopt.bodies.solvers.constants import RTOL
 from contactopt.bodies.solvers.multigrid import conjugate_gradients, nodal_blocks
 from contactopt.bodies.solvers.system import Submatrix, System
 from contactopt.errors import BackendError, InputError
+from contactopt.linear.budget import NextBest, TooDear, open_budget
 
 
 def energy(A, x):
@@ -65,6 +66,16 @@ def test_iterations_do_not_depend_on_units_and_vanish_without_load():
     for x, cycles in answers[1:]:
         assert np.linalg.norm(x - answers[0][0]) <= 1e-7 * np.linalg.norm(answers[0][0])
         assert cycles == answers[0][1] > 0
+
+
+def test_a_rough_solve_tells_nothing_of_the_cost_of_others():
+    """Its first digit takes the most V-cycles: a good way was left for a product to two digits."""
+    solver = made("multigrid", BODIES["solid foundation"])
+    b = np.random.default_rng(0).standard_normal(BODIES["solid foundation"].A.shape[0])
+    with open_budget(NextBest("coupled", "explicit", "superlu", 1e9, 1e7, None)):
+        solver.solve(b, 1e-2)
+        with pytest.raises(TooDear):
+            solver.solve(b)
 
 
 def test_a_block_is_the_matrix_without_the_other_rows():

@@ -21,7 +21,7 @@ from contactopt.accuracy.estimate import Level
 from contactopt.checks import place_words
 from contactopt.readings.corners import at_re_entrant
 from contactopt.readings.peaks import Peak, Reading, at_rim
-from contactopt.readings.resultants import views
+from contactopt.readings.resultants import pair_view
 from contactopt.solving.solve_scene import Solved
 
 HALVED = 1.8  # by how much smaller elements must be for a level to count as the next one
@@ -57,7 +57,7 @@ def _singular(solved: Solved, peak: Peak) -> bool:
     if peak.body < 0:
         pairs, first = solved.reduction.problem.pairs, peak.contacts[0]
         number = next(i for i, pair in enumerate(pairs) if pair.start <= first < pair.stop)
-        return at_rim(*views(solved.reduction, solved.solution)[number])
+        return at_rim(*pair_view(solved.reduction, solved.solution, number))
     return at_re_entrant(solved.reduction, peak)
 
 

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import skfem
 from skfem import Mesh
-from skfem.helpers import dot
 
 from contactopt.bodies.assembly import Assembly
 from contactopt.bodies.corners import copies
@@ -24,10 +23,10 @@ from contactopt.bodies.elements import (
     contact_trace,
     face_integrals,
     make_basis,
+    nodal_forces,
     node_unknowns,
     nodes_on,
     surface_load,
-    weight_at,
 )
 from contactopt.bodies.motions import check_free, free_motions
 from contactopt.bodies.stiffness import isotropic_stiffness
@@ -244,13 +243,8 @@ def _load(part: Part, basis: skfem.CellBasis, weight: Weight) -> np.ndarray:
         if load.boundary:
             total += surface_load(basis, basis.mesh.boundaries[load.boundary], load.density, weight)
             continue
-
-        @skfem.LinearForm
-        def form(v, w, load=load):  # type: ignore[no-untyped-def]
-            x = np.asarray(w.x)
-            return dot(load.density(x, x), v) * weight_at(weight, x)
-
-        total += form.assemble(basis)
+        x = np.asarray(basis.global_coordinates())
+        total += nodal_forces(basis, np.asarray(load.density(x, x)), weight)
     return total
 
 

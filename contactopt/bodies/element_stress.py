@@ -6,7 +6,7 @@ import numpy as np
 import skfem
 
 from contactopt.bodies.assembly import Assembly
-from contactopt.bodies.elements import weight_at, with_jacobians
+from contactopt.bodies.elements import interpolated, weight_at, with_jacobians
 from contactopt.bodies.fields import PLACES, Fields, Validity, von_mises
 from contactopt.defaults import ROUNDED
 from contactopt.meshes.cells import SHAPES, second_order, straight
@@ -30,7 +30,8 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0
     rounding = ROUNDED * float((abs(body.A) @ np.abs(U)).sum())
     if applied <= least and size <= max(least, rounding):
         unbalanced = 0.0  # supports move the body as a whole: all forces are rounding
-    gradient = _middle_gradient(body.basis, U)
+    middle = body.basis.mesh.init_refdom().p.mean(axis=1, keepdims=True)
+    gradient = _gradient(body.basis, U, middle)[..., 0].transpose(2, 0, 1)
     turned = gradient.swapaxes(1, 2)
     strains = np.abs(np.linalg.eigvalsh((gradient + turned) / 2)).max(axis=1)
     mean = np.sqrt(np.average(strains**2, weights=np.sum(body.basis.dx, axis=1)))
@@ -45,14 +46,16 @@ def limits_of(body: Assembly, U: np.ndarray, force: np.ndarray, least: float = 0
     )
 
 
-def _middle_gradient(basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
-    """The gradient (elements, dim, dim) of a displacement in the middle of every element."""
-    middle = basis.mesh.init_refdom().p.mean(axis=1, keepdims=True)
-    shape, dim = basis.elem.elem, len(middle)
-    slopes = np.stack([shape.lbasis(middle, i)[1][:, 0] for i in range(basis.Nbfun // dim)])
-    own = U[basis.element_dofs].reshape(len(slopes), dim, -1)
-    inverse = np.asarray(basis.mapping.invDF(middle))[..., 0].transpose(2, 0, 1)
-    return np.einsum("aie,ak->eik", own, slopes) @ inverse
+def _gradient(
+    basis: skfem.CellBasis, U: np.ndarray, places: np.ndarray, elements: np.ndarray | None = None
+) -> np.ndarray:
+    """The gradient (dim, dim, elements, points) of a displacement, as for stress_in()."""
+    shape, some = basis.elem.elem, slice(None) if elements is None else elements
+    slopes = np.stack([shape.lbasis(places, i)[1] for i in range(basis.Nbfun // len(places))])
+    own = U[basis.element_dofs[:, some]].reshape(len(slopes), len(places), -1)
+    local = np.einsum("iae,ibq->abeq", own, slopes, optimize=True)
+    inverse = with_jacobians(basis.mapping, places, some).invDF(places, tind=elements)
+    return np.einsum("abeq,bceq->aceq", local, np.asarray(inverse))
 
 
 def fields_of(body: Assembly, U: np.ndarray) -> Fields:
@@ -79,15 +82,13 @@ def nodal_stress(
     volume = basis.dx.sum(axis=1)
     shape = SHAPES[mesh.refdom.__name__][1][body.degree if everywhere else 1]()
     if body.degree == 1:
-        stress = stress_in(body, basis, U) if stress is None else stress
+        stress = stress_in(body, U, basis.X) if stress is None else stress
         element = np.sum(stress * basis.dx, axis=3) / volume
         values = np.repeat(element[..., None], len(mesh.t), axis=3)
     else:
-        places = shape.doflocs.T
         blocks = np.array_split(np.arange(mesh.nelements), -(-mesh.nelements // BLOCK))
-        rule = places, np.ones(places.shape[1])
-        bases = (skfem.Basis(mesh, basis.elem, elements=block, quadrature=rule) for block in blocks)
-        values = np.concatenate([stress_in(body, at, U) for at in bases], axis=2)
+        stresses = [stress_in(body, U, shape.doflocs.T, block) for block in blocks]
+        values = np.concatenate(stresses, axis=2)
     nodes = skfem.Dofs(mesh, shape).element_dofs  # numbered as the nodes are
     where, count = nodes.T.ravel(), int(nodes.max()) + 1
     weight = np.bincount(where, np.repeat(volume, len(nodes)), count)
@@ -114,18 +115,14 @@ def recovery_errors(body: Assembly, U: np.ndarray, *others: np.ndarray) -> tuple
     Source: Zienkiewicz, Zhu (1987), A simple error estimator and adaptive procedure for practical
     engineering analysis.
     """
-    basis, mesh = body.basis, straight(body.basis.mesh)
-    vertices = skfem.Basis(
-        mesh, SHAPES[mesh.refdom.__name__][1][1](), quadrature=(basis.X, basis.W)
-    )
+    basis, corners = body.basis, body.basis.mesh.t
+    vertex = SHAPES[basis.mesh.refdom.__name__][1][1]()
+    hats = [vertex.lbasis(basis.X, i)[0] for i in range(len(corners))]
 
     def missing(field: np.ndarray) -> np.ndarray:
-        stress = stress_in(body, basis, field)
+        stress = stress_in(body, field, basis.X)
         nodal = nodal_stress(body, field, False, stress)
-        smooth = sum(
-            nodal[:, :, own][..., None] * np.asarray(shape[0])
-            for own, shape in zip(mesh.t, vertices.basis)
-        )
+        smooth = sum(nodal[:, :, own][..., None] * hat for own, hat in zip(corners, hats))
         return np.asarray(smooth - stress)
 
     measure = basis.dx * weight_at(body.weight, np.asarray(basis.global_coordinates()))
@@ -153,28 +150,28 @@ def added_work(
     basis = body.basis
     centre = np.asarray(basis.global_coordinates()).mean(axis=2)
     measure, found = volumes * weight_at(body.weight, centre), []
-    own = stress_in(body, basis, U).mean(axis=3)
+    own = stress_in(body, U, basis.X).mean(axis=3)
     for W in others:
-        stress = own if W is U else stress_in(body, basis, W).mean(axis=3)
-        moved = np.sum(force(centre) * np.asarray(basis.interpolate(W)).mean(axis=2), axis=0)
+        stress = own if W is U else stress_in(body, W, basis.X).mean(axis=3)
+        moved = np.sum(force(centre) * interpolated(basis, W).mean(axis=2), axis=0)
         found.append(np.asarray((moved - _product(body, own, stress)) * measure))
     return tuple(found)
 
 
-def stress_in(body: Assembly, basis: skfem.CellBasis, U: np.ndarray) -> np.ndarray:
-    """Stress tensor (3, 3, elements, points) at the quadrature points of a basis of the body."""
-    places, shape, dim = basis.X, basis.elem.elem, len(basis.mesh.p)
-    elements = slice(None) if basis.tind is None else basis.tind
-    values, slopes = zip(*(shape.lbasis(places, i) for i in range(basis.Nbfun // dim)))
-    own = U[basis.element_dofs].reshape(len(values), dim, -1)
-    mapping = with_jacobians(basis.mapping, places, elements)
-    local = np.einsum("iae,ibq->abeq", own, np.stack(slopes), optimize=True)
-    inverse = np.asarray(mapping.invDF(places, tind=basis.tind))
-    gradient, hoop = np.einsum("abeq,bceq->aceq", local, inverse), None
+def stress_in(
+    body: Assembly, U: np.ndarray, places: np.ndarray, elements: np.ndarray | None = None
+) -> np.ndarray:
+    """Stress tensor (3, 3, elements, points) at reference places (dim, points) in elements (by
+    number; None: all of them).
+    """
+    gradient, hoop = _gradient(body.basis, U, places, elements), None
+    some = slice(None) if elements is None else elements
     if body.weight[1]:  # u_r / r, on the axis its limit
-        r = np.asarray(basis.global_coordinates())[0]
+        own = U[body.basis.element_dofs[:: len(places), some]]
+        values = [body.basis.elem.elem.lbasis(places, i)[0] for i in range(len(own))]
+        r = np.asarray(body.basis.mapping.F(places, tind=elements))[0]
         away, limit = r > 1e-12 * r.max(), gradient[0, 0].copy()
-        hoop = np.divide(own[:, 0].T @ np.stack(values), r, where=away, out=limit)
+        hoop = np.divide(own.T @ np.stack(values), r, where=away, out=limit)
     return stress_of(body.kind.constants(body.material), gradient, hoop)
 
 

@@ -20,11 +20,11 @@ SIAM J. Sci. Comput. 34, B421-B446.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -120,15 +120,14 @@ def with_jacobians(
 
 
 class LeanBasis(skfem.CellBasis):
-    """A CellBasis that evaluates each shape function when it is asked for: the values of all would
-    take more memory than the stiffness matrix.
+    """A CellBasis without the values of shape functions, which would take more memory than the
+    stiffness matrix.
     """
 
     def __init__(self, mesh: skfem.Mesh, element: skfem.Element, order: int):
         super(skfem.CellBasis, self).__init__(mesh, element, intorder=order, refdom=mesh.refdom)
         self.tind, self.nelems = None, mesh.nelements
         self.dx = self._volumes() * np.broadcast_to(self.W, (self.nelems, len(self.W)))
-        self.basis = _Shapes(element, self.mapping, self.X, self.Nbfun)
 
     def _volumes(self) -> np.ndarray:
         """Volume per reference volume (element, point); InputError for a flat or folded element."""
@@ -151,20 +150,24 @@ class LeanBasis(skfem.CellBasis):
         return np.asarray(np.abs(ratio))
 
 
-@dataclass(frozen=True)
-class _Shapes(Sequence[Any]):
-    element: skfem.Element
-    mapping: skfem.mapping.Mapping
-    points: np.ndarray
-    functions: int
+def interpolated(basis: skfem.CellBasis, field: np.ndarray) -> np.ndarray:
+    """A displacement (n,) at the points of integration, (dim, element, point)."""
+    N = _shapes(basis)
+    own = field[basis.element_dofs].reshape(len(N), -1, basis.mesh.nelements)
+    return np.einsum("iq,iae->aeq", N, own, optimize=True)
 
-    def __len__(self) -> int:
-        return self.functions
 
-    def __getitem__(self, number: Any) -> Any:
-        if not -self.functions <= number < self.functions:
-            raise IndexError(number)
-        return self.element.gbasis(self.mapping, self.points, number % self.functions)
+def nodal_forces(basis: skfem.CellBasis, force: np.ndarray, weight: Weight) -> np.ndarray:
+    """The nodal forces (n,) of a force per volume (dim, element, point)."""
+    x = np.asarray(basis.global_coordinates()) if weight[1] else np.zeros(1)
+    measure = basis.dx * weight_at(weight, x)
+    nodal = np.einsum("iq,aeq->iae", _shapes(basis), force * measure, optimize=True)
+    return np.bincount(basis.element_dofs.ravel(), nodal.ravel(), basis.N)
+
+
+def _shapes(basis: skfem.CellBasis) -> np.ndarray:
+    shape, count = basis.elem.elem, basis.Nbfun // len(basis.mesh.p)
+    return np.stack([shape.lbasis(basis.X, i)[0] for i in range(count)])
 
 
 def node_unknowns(basis: skfem.CellBasis) -> np.ndarray:

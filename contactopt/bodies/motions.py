@@ -25,9 +25,8 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 import skfem
-from skfem.helpers import dot
 
-from contactopt.bodies.elements import Weight, node_unknowns, weight_at
+from contactopt.bodies.elements import Weight, interpolated, nodal_forces, node_unknowns
 from contactopt.defaults import EQUAL, ROUNDED
 from contactopt.errors import InputError
 from contactopt.scenes.kinds import Kind
@@ -87,7 +86,8 @@ def free_motions(kind: Kind, basis: skfem.CellBasis, held: np.ndarray, weight: W
         return Motions(Z, (), np.zeros(0, dtype=int), Z.copy())
     free = np.flatnonzero(~held)
     fixing = free[la.qr(Z[free].T, pivoting=True, mode="r")[1][: len(names)]]
-    inertia = np.stack([_inertia(basis, z, weight) for z in Z.T], axis=1)
+    forces = [nodal_forces(basis, interpolated(basis, z), weight) for z in Z.T]  # of inertia
+    inertia = np.stack(forces, axis=1)
     inertia[held] = 0.0
     return Motions(Z, names, np.sort(fixing), inertia @ np.linalg.inv(Z.T @ inertia))
 
@@ -130,16 +130,6 @@ def _name(column: np.ndarray, labels: tuple[str, ...]) -> str:
     size = np.abs(column)
     size = size * np.where(turning, 1e3, 1.0) * (size > 1e-3 * size.max())
     return labels[int(np.argmax(size))]
-
-
-def _inertia(basis: skfem.CellBasis, field: np.ndarray, weight: Weight) -> np.ndarray:
-    """Nodal forces (n,) of the field as a force per volume."""
-
-    @skfem.LinearForm
-    def form(v, w):  # type: ignore[no-untyped-def]
-        return dot(w["field"], v) * weight_at(weight, w.x)
-
-    return np.asarray(form.assemble(basis, field=basis.interpolate(field)))
 
 
 def check_free(name: str, A: sp.csr_matrix, motions: Motions) -> None:

@@ -25,6 +25,7 @@ _SHAPES = {
     "RefHex": (4, {1: skfem.ElementQuad1(), 2: skfem.ElementQuad2()}),
 }
 NEWTON, STEPS = 1e-13, 30  # accuracy of a place on a face, in its own coordinates
+BLOCK = 8192  # points at a time, so that what is computed of them stays in the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +139,13 @@ class Faces:
             tangents += x[:, None] * rate
         return place, tangents
 
-    def normals(self, face: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Outward unit normals (dim, m) on faces (m,) at reference coordinates (dim - 1, m)."""
-        normal = cross(self.locations(face, at)[1]) * self.turn[face]
-        return np.asarray(normal / np.linalg.norm(normal, axis=0))
+    def stretched(self, face: np.ndarray, tangents: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Outward unit normals (dim, m) on faces (m,) with tangents (dim, dim - 1, m), and areas
+        (m,) per area of the reference face.
+        """
+        normal = cross(tangents) * self.turn[face]
+        size = np.linalg.norm(normal, axis=0)
+        return normal / size, size
 
     def mirrored(self, vectors: np.ndarray, nodes: np.ndarray | None = None) -> np.ndarray:
         """Vectors (dim, k) at nodes (k,), or at all, summed with their mirror images."""
@@ -160,6 +164,14 @@ class Faces:
         points x (dim, m), by Newton's iteration from `start`; one step is exact on affine faces.
         """
         at = np.array(np.broadcast_to(start, (self.dim - 1, len(face))))
+        for first in range(0, len(face), BLOCK):
+            own = slice(first, first + BLOCK)
+            at[:, own] = self._located(face[own], x[:, own], axes[own], at[:, own])
+        return at
+
+    def _located(
+        self, face: np.ndarray, x: np.ndarray, axes: np.ndarray, at: np.ndarray
+    ) -> np.ndarray:
         left = np.arange(len(face))
         for _ in range(STEPS):
             here, tangents = self.locations(face[left], at[:, left])
@@ -216,7 +228,8 @@ def face_normals(surface: Faces) -> np.ndarray:
     """(dim, f) outward unit normals at the middle of every face."""
     middle = surface.places[:, : surface.corners].mean(axis=1)
     count = len(surface.faces)
-    return surface.normals(np.arange(count), np.repeat(middle[:, None], count, axis=1))
+    face, at = np.arange(count), np.repeat(middle[:, None], count, axis=1)
+    return surface.stretched(face, surface.locations(face, at)[1])[0]
 
 
 def cross(tangents: np.ndarray) -> np.ndarray:

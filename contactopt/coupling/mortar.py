@@ -159,16 +159,17 @@ def mortar(upper: Faces, lower: Faces, own: str | None = None) -> Mortar:
     mine, theirs = pair[first], pair[1 - first]
     # Where the surfaces face each other, along the normals of the side that carries the contacts.
     normals, sizes, full = contact_normals(mine)
-    points = overlap(mine, theirs, normals)
-    here = _contacts(mine, points.cell // len(mine.cells))
-    if own is None and _contacts(theirs, points.face) > here:
+    pieces = overlap(mine, theirs, normals)
+    here = _contacts(mine, pieces.cell // len(mine.cells))
+    if own is None and _contacts(theirs, pieces.face) > here:
         return mortar(upper, lower, "upper")
-    if not len(points.cell):
+    if not len(pieces.cell):
         raise InputError(
             f"the contact boundaries of body '{upper.name}' and body '{lower.name}' face each other"
             " nowhere; check the boundaries' names, the bodies' positions, and which of them is"
             " the upper one."
         )
+    points = pieces.points()
     sums = integrate(mine, theirs, points, full)
     nodes = sums.nodes
     # Normals are always those of the lower body: its own at its nodes, or as they are seen from the
@@ -279,8 +280,7 @@ def _alone(
     mine = sp.csr_matrix((np.ones(k), (np.arange(k), nodes)), (k, own.points.shape[1]))
     # a point on the faces of the node itself: at a corner others are as near
     inward = NUDGE * (_centres(own)[:, nodes] - x)
-    places = own.locations(points.cell // len(own.cells), points.at)[0]
-    near = KDTree(places.T).query((x + inward).T)[1]
+    near = KDTree(points.place.T).query((x + inward).T)[1]
     n, axes = normals[:, nodes].T[:, None], points.axes[near]
     axes = axes - np.sum(axes * n, axis=2, keepdims=True) * n
     face = points.face[near]

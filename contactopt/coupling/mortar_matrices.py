@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from contactopt.coupling.faces import Faces
+from contactopt.coupling.faces import BLOCK, Faces
 from contactopt.coupling.rounded_kinks import Rounding
 from contactopt.coupling.segments import Overlap
 
@@ -21,7 +21,6 @@ from contactopt.coupling.segments import Overlap
 # cell
 SLIVER = 1e-11
 WEAK = 0.2  # contacts with less than this share of their area pass it on to a neighbour
-BLOCK = 200_000  # points of integration at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,24 +76,23 @@ def integrate(own: Faces, other: Faces, points: Overlap, full: np.ndarray) -> In
         new_cell = np.diff(points.cell[block], prepend=-1)
         pairs = np.flatnonzero(new_cell | np.diff(points.face[block], prepend=-1))
         row = rows[dual.cell[block]][pairs]
-        places = []
         faces = points.cell[block] // len(own.cells), points.face[block]
         for i, at in enumerate((points.at[:, block], points.there[:, block])):
             column = sides[i].faces[faces[i]][pairs]
             values = dual.functional(sides[i].shapes(at), block, pairs)
             W[i] = W[i] + collect(values, row, column, W[i].shape)
-            places.append(sides[i].true(sides[i].locations(faces[i], at)[0]))
+        here = own.true(points.place[:, block])
+        vector = here - other.true(other.locations(faces[1], points.there[:, block])[0])
         if rounding is not None:
             values = dual.functional(rounding.values(block), block, pairs)
             shape = k, rounding.rises.shape[0]
             term = collect(values, row, rounding.columns(block, pairs), shape)
             W[1] = W[1] + term @ rounding.rises
             across = [there + term @ more for there, more in zip(across, rounding.across)]
-        vector = places[0] - places[1]
         # The deepest overlap of the surfaces, for a message.
-        distance = -np.sum(vector * own.normals(faces[0], points.at[:, block]), axis=0)
+        distance = -np.sum(vector * points.normal[:, block], axis=0)
         if distance.min() < least:
-            least, nearest = float(distance.min()), places[0][:, np.argmin(distance)]
+            least, nearest = float(distance.min()), here[:, np.argmin(distance)]
         means = dual.functional(vector, block, pairs)
         for d in range(own.dim):
             apart[d] += np.bincount(row.ravel(), means[:, :, d].ravel(), k)

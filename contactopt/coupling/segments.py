@@ -16,7 +16,9 @@ Commun. ACM 17, 32-42 (cut).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,7 +29,7 @@ from skfem.refdom import RefLine, RefTri
 
 from contactopt.bodies.elements import weight_at
 from contactopt.checks import place_words
-from contactopt.coupling.faces import Faces, cross, face_normals, patches
+from contactopt.coupling.faces import Faces, face_normals, patches
 from contactopt.coupling.facing import Facets, facing_pairs
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
@@ -49,6 +51,8 @@ class Overlap:
     cell    (g,) linear cell of the own side: face times cells of a face, plus its number on the
             face
     at      (dim - 1, g) reference coordinates on the own face
+    place   (dim, g) points of the own face there
+    normal  (dim, g) its outward unit normals
     face    (g,) face of the other side
     there   (dim - 1, g) reference coordinates on it
     axes    (g, dim - 1, dim) directions across which both places coincide: the line between them is
@@ -60,6 +64,8 @@ class Overlap:
 
     cell: np.ndarray
     at: np.ndarray
+    place: np.ndarray
+    normal: np.ndarray
     face: np.ndarray
     there: np.ndarray
     axes: np.ndarray
@@ -67,7 +73,15 @@ class Overlap:
     window: np.ndarray
 
 
-def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
+class Pieces(NamedTuple):
+    """Own cells (q,) and other faces (q,) with points of integration, and what makes these."""
+
+    cell: np.ndarray
+    face: np.ndarray
+    points: Callable[[], Overlap]
+
+
+def overlap(own: Faces, other: Faces, normals: np.ndarray) -> Pieces:
     """Find where two surfaces overlap, with points of integration in the order of the own cells,
     whose normals `normals` (dim, n) are given at its points. InputError if the other is folded.
     """
@@ -182,7 +196,7 @@ def _layers(other: Faces, cell: np.ndarray, face: np.ndarray) -> np.ndarray:
     return np.asarray(connected_components(graph, directed=False)[1][:q])
 
 
-def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
+def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Pieces:
     mine, theirs = _cut(own, True), _cut(other, False)
     ends = own.faces[mine.face[:, None], own.cells[mine.cell % len(own.cells)]]  # (p, 2)
     turn = np.sum(mine.normal[:, :, None] * normals[:, ends], axis=0).clip(-1.0, 1.0)
@@ -203,9 +217,12 @@ def _lines(own: Faces, other: Faces, normals: np.ndarray) -> Overlap:
     axes = np.stack([n[1], -n[0]]).T[:, None, :]
     x, tangents = seen.locations(local)
     there = other.locate(face, x, axes, np.array([[0.5]]))
+    normal, stretch = own.stretched(cell // len(own.cells), tangents)
     measure = (share * length[keep, None]).ravel() * np.abs(seen.width[0])
-    measure *= np.linalg.norm(tangents[:, 0], axis=0) * weight_at(own.weight, x)
-    return Overlap(cell, seen.start + seen.width * local, face, there, axes, measure, window)
+    measure *= stretch * weight_at(own.weight, x)
+    at = seen.start + seen.width * local
+    made = Overlap(cell, at, x, normal, face, there, axes, measure, window)
+    return Pieces(cell, face, lambda: made)
 
 
 class _Seen:
@@ -266,7 +283,7 @@ def _windows(own: Faces, cell: np.ndarray, corners: np.ndarray, covered: np.ndar
     return np.stack([low, high - low])
 
 
-def _polygons(own: Faces, other: Faces) -> Overlap:
+def _polygons(own: Faces, other: Faces) -> Pieces:
     mine, theirs = _cut(own, True), _cut(other, False)
     first, second = _facing(mine, theirs, np.zeros(len(mine.face)))
     axes = _axes(mine)
@@ -288,29 +305,32 @@ def _polygons(own: Faces, other: Faces) -> Overlap:
     middle = _in_space(mine, axes, first, polygon.mean(axis=1))
     normal = mine.normal[:, first]
     keep, covered = _nearest(other, mine, theirs, (first, second), part, middle, normal)
-    # the corners of pieces on cells that are covered in part only, in the coordinates of the cells
-    part_of = np.flatnonzero(keep & (covered[mine.cell[first]] < 1 - EQUAL))
-    cut = np.repeat(first[part_of], polygon.shape[1])
-    x = _in_space(mine, axes, cut, polygon[part_of].reshape(-1, 2))
-    here = own.locate(mine.face[cut], x, axes[cut], mine.middle[:, cut])
-    corners = own.local(mine.cell[cut] % len(own.cells), here).reshape(2, -1, polygon.shape[1])
-    window = _windows(own, mine.cell[first[part_of]], corners, covered)
     piece, fan = np.nonzero(keep[:, None] & (content > 1e-15 * np.abs(area)[first, None]))
-    points, share = get_quadrature(RefTri, _order(own, other))
-    corner = np.stack([1 - points[0] - points[1], points[0], points[1]])
-    y = np.einsum("vq,tva->tqa", corner, triangles[piece, fan]).reshape(-1, 2)
-    content = (content[piece, fan, None] * share / share.sum()).ravel()
-    piece = np.repeat(piece, len(share))
-    first, second = first[piece], second[piece]
-    E, cell, face = axes[first], mine.cell[first], theirs.face[second]
-    x = _in_space(mine, axes, first, y)
-    here = own.locate(mine.face[first], x, E, mine.middle[:, first])
-    there = other.locate(face, x, E, theirs.middle[:, second])
-    place, tangents = own.locations(mine.face[first], here)
-    stretch = np.linalg.norm(cross(tangents), axis=0)
-    stretch /= np.abs(np.linalg.det(np.einsum("gad,dcg->gac", E, tangents)))
-    measure = content * stretch * weight_at(own.weight, place)
-    return Overlap(cell, here, face, there, E, measure, window)
+
+    def points() -> Overlap:
+        # corners of pieces on cells that are covered in part only, in the coordinates of the cells
+        part_of = np.flatnonzero(keep & (covered[mine.cell[first]] < 1 - EQUAL))
+        cut = np.repeat(first[part_of], polygon.shape[1])
+        x = _in_space(mine, axes, cut, polygon[part_of].reshape(-1, 2))
+        here = own.locate(mine.face[cut], x, axes[cut], mine.middle[:, cut])
+        corners = own.local(mine.cell[cut] % len(own.cells), here).reshape(2, -1, polygon.shape[1])
+        window = _windows(own, mine.cell[first[part_of]], corners, covered)
+        at, share = get_quadrature(RefTri, _order(own, other))
+        corner = np.stack([1 - at[0] - at[1], at[0], at[1]])
+        y = np.einsum("vq,tva->tqa", corner, triangles[piece, fan]).reshape(-1, 2)
+        measure = (content[piece, fan, None] * share / share.sum()).ravel()
+        one, facing = (np.repeat(numbers[piece], len(share)) for numbers in (first, second))
+        E, face = axes[one], theirs.face[facing]
+        x = _in_space(mine, axes, one, y)
+        here = own.locate(mine.face[one], x, E, mine.middle[:, one])
+        there = other.locate(face, x, E, theirs.middle[:, facing])
+        place, tangents = own.locations(mine.face[one], here)
+        normal, stretch = own.stretched(mine.face[one], tangents)
+        measure *= stretch / np.abs(np.linalg.det(np.einsum("gad,dcg->gac", E, tangents)))
+        measure *= weight_at(own.weight, place)
+        return Overlap(mine.cell[one], here, place, normal, face, there, E, measure, window)
+
+    return Pieces(mine.cell[first[piece]], theirs.face[second[piece]], points)
 
 
 def areas(polygons: np.ndarray) -> np.ndarray:

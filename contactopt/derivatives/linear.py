@@ -95,7 +95,7 @@ class Tangent:
     ) -> tuple[np.ndarray, np.ndarray, Callable[[], np.ndarray]]:
         """z (k d,) and b (p,) of M' (a, b) = (by_r, by_multipliers), and what gives a (k d,)."""
         back = self.transposed
-        if self.other is not None:
+        if back.other is not None:
             z, b, moved = back.solve(back.slope(by_r), by_multipliers)
             rho = np.repeat(self.rho, self.D.shape[1])
             return z, b, lambda: z / rho + by_r - moved() - self.V @ b

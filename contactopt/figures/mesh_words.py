@@ -10,6 +10,7 @@ from skfem import Mesh
 
 from contactopt.bodies.elements import Faces
 from contactopt.cards import count
+from contactopt.checks import RINGS, remembered
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
 UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
@@ -23,7 +24,9 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
     named = {re.sub(r"[^\w-]", "-", group or path.stem): mesh for group, mesh in meshes.items()}
     solid = any(len(mesh.p) == 3 for mesh in meshes.values())
     inside, side = ("volume", "area") if solid else ("area", "length")
-    lines = [f'kind = "{"solid" if solid else "plane-strain"}"', UNITS]
+    rings = any(text.endswith(RINGS) for mesh in meshes.values() for text in remembered(mesh))
+    kind = "solid" if solid else "axisymmetric" if rings else "plane-strain"
+    lines = [f'kind = "{kind}"', UNITS]
     for (name, mesh), group in zip(named.items(), meshes):
         size = np.abs(mesh.p).max()
         low, high = _place(mesh.p.min(axis=1), size), _place(mesh.p.max(axis=1), size)

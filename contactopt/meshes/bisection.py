@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from skfem import Mesh, MeshTet
 
+from contactopt.meshes.cells import knowing
+
 ENDS = np.array([[0, 0, 0, 1, 1, 2], [1, 2, 3, 2, 3, 3]])  # of the edges of a tetrahedron
 OPPOSITE = [3, 2, 1, 0]  # vertex opposite to each facet in the order of scikit-fem
 
@@ -39,7 +41,7 @@ class Cut(NamedTuple):
             name: np.flatnonzero(np.isin(parent, members)).astype(np.int32)
             for name, members in (old.boundaries or {}).items()
         }
-        return made.with_boundaries(names) if names else made
+        return knowing(made.with_boundaries(names), made) if names else made
 
 
 def uncut(mesh: Mesh) -> Cut:

@@ -4,8 +4,9 @@ meshio reads no file without BEGIN BULK, such as those of Gmsh, nor elements in 
 passes over cards and coordinate systems that it does not know. A card has fields between commas, or
 of 8 or 16 characters (a name with *); it goes on in lines that begin with +, * or an empty field,
 which may stand elsewhere if they begin with the mark at its end.
-Elements without an extent are passed over. A card of an element that is not known is refused, as is
-a node in a coordinate system of its own. The number of its property names the group of an element.
+Elements and links without an extent are passed over. A card of an element that is not known is
+refused, as is a node in a coordinate system of its own. The number of its property names the group
+of an element.
 
 Source: MSC Nastran, Quick Reference Guide, "Bulk data entries".
 """
@@ -20,6 +21,7 @@ import numpy as np
 
 from contactopt.cards import count
 from contactopt.errors import Damaged, InputError
+from contactopt.meshes.exodus import HEXAHEDRON
 from contactopt.meshes.inp_elements import CORNERS
 from contactopt.meshes.inp_text import text_of
 
@@ -29,30 +31,39 @@ _SHAPES = (
     ("CTRIA6 CPLSTN6 CPLSTS6", {6: "triangle6"}),
     ("CQUAD4 CQUADR CSHEAR CPLSTN4 CPLSTS4", {4: "quad"}),
     ("CQUAD8 CPLSTN8 CPLSTS8", {8: "quad8"}),
-    ("CQUAD CQUAD9", {9: "quad9"}),
+    ("CQUAD", {4: "quad", 8: "quad8", 9: "quad9"}),
+    ("CQUAD9", {9: "quad9"}),
     ("CTETRA", {4: "tetra", 10: "tetra10"}),
     ("CHEXA", {8: "hexahedron", 20: "hexahedron20"}),
     ("CPENTA", {6: "wedge", 15: "wedge"}),
     ("CPYRAM", {5: "pyramid", 13: "pyramid"}),
-    ("CROD CBAR CBEAM CTUBE PLOTEL", {2: "line"}),
+    ("CROD CBAR CBEAM CBEND CTUBE CONROD PLOTEL", {2: "line"}),
 )
 ELEMENTS = {card: shapes for cards, shapes in _SHAPES for card in cards.split()}
 SOLIDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRAM")  # whose cards end with their nodes
-# the first node of a card: PLOTEL has no property
-FIRST = {"PLOTEL": 2}
+# the first node of a card: these have no property
+FIRST = {"PLOTEL": 2, "CONROD": 2}
 POINTS = re.compile(
-    "CELAS|CDAMP|CMASS|CBUSH|CGAP|CVISC|CONM|CFAST|CWELD|CBEAR|CSEAM|CHBDY|CORD|CREEP|CYSYM|CYJOIN"
-    "|CYAX|CSUPER|CSET|COUPLE|CAERO|CLOAD|CONV|CONVM|CBARAO|CSSCHD|CAMPBLL"
+    "CELAS|CDAMP|CMASS|CBUSH|CGAP|CVISC|CONM[12]|CFAST|CWELD|CBEAR|CSEAM|CHBDY|CMBUSH|MPC$"
+    "|RBE[123]|RBAR|RROD|RTRPLT|RSPLINE|RSSCON|RJOINT"
+)
+# cards with such a first letter that are no elements
+HARMLESS = re.compile(
+    "CORD|CREEP|CY|CSUP|CSET|COUPLE|CAERO|CLOAD|CONV|CBARAO|CSSCHD|CAMPBLL|CONTACT|CONTPRM|CNTSTB"
+    "|CONCTL|CONTRLT"
 )
 # cards that are not read though they make nodes or elements, those with a slip in the name, and
 # those that repeat the card above (=)
 UNKNOWN = re.compile("C|E?GRID|HEX|INCLUDE|PENTA|PLOT|PYR|QUAD|TETRA|TRIA|(?![A-Z][A-Z0-9]*$)")
 # properties that give shells and lines a stiffness
 SECTIONS = re.compile("P(BAR|BEAM|COMP|ROD|SHEAR|SHELL|TUBE)")
-# the order of meshio: edges along the third axis come last
-HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15]
 Card = tuple[int, list[str]]  # line and fields
 log = logging.getLogger(__name__)
+
+
+def is_bulk_data(path: Path) -> bool:
+    """Whether a file begins its bulk data, or lists nodes as bulk data do."""
+    return re.search(rb"^\s*(BEGIN\s+BULK|GRID[ \t*,])", path.read_bytes(), re.M | re.I) is not None
 
 
 def read_bulk_data(path: Path) -> Any:
@@ -63,7 +74,8 @@ def read_bulk_data(path: Path) -> Any:
     for line, card in _cards(path):
         reader.take(line, card)
     if reader.passed:
-        log.warning("%s: elements without extent are left out: %s", path, ", ".join(reader.passed))
+        said = "%s: elements and links without extent are left out: %s"
+        log.warning(said, path, ", ".join(sorted(reader.passed)))
     tags = np.array(sorted(reader.nodes), dtype=np.int64)
     if not len(tags) or not reader.elements:
         raise Damaged("it holds no nodes or no elements")
@@ -78,14 +90,16 @@ def read_bulk_data(path: Path) -> Any:
             said = f"an element names node {number}, which is not there"
             raise reader.fail(rows[lost[0, 0]][0], said)
         if kind == "hexahedron20":
-            nodes = nodes[:, HEXAHEDRON]
+            nodes = nodes[:, HEXAHEDRON[:20]]
         cells.append((kind, np.searchsorted(tags, nodes[:, : CORNERS.get(kind)])))
         groups.append(np.array([group for _, group, _ in rows], dtype=np.int64))
-    return meshio.Mesh(points, cells, cell_data={"nastran:ref": groups})
+    return meshio.Mesh(points, cells, cell_data={"nastran:ref": groups}, info=reader.words)
 
 
 class _Reader:
-    """nodes: number -> place;  elements: shape -> line, group and nodes of each;  passed: cards"""
+    """nodes: number -> place;  elements: shape -> line, group and nodes of each;  passed: cards
+    words: shape -> card and line of the first element
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -93,7 +107,8 @@ class _Reader:
         self.elements: dict[str, list[tuple[int, int, list[int]]]] = {}
         self.numbers: set[int] = set()
         self.passed: set[str] = set()
-        self.sections: set[int] = set()
+        self.sections: dict[int, float] = {}  # thickness by property
+        self.words: dict[str, str] = {}
 
     def fail(self, line: int, message: str) -> InputError:
         return InputError(f"mesh file '{self.path}', line {line}: {message}.")
@@ -126,38 +141,46 @@ class _Reader:
         elif name in ELEMENTS:
             self._element(line, card)
         elif SECTIONS.match(name):
-            self.sections.add(self.whole(line, "".join(card[1:2])))
+            depth = self.real(line, card[3]) if name == "PSHELL" else 0.0
+            self.sections[self.whole(line, card[1])] = depth or 1.0
         elif POINTS.match(name):
-            self.passed |= set() if name.startswith("CORD") else {name}
-        elif UNKNOWN.match(name):
+            self.passed.add(name)
+        elif UNKNOWN.match(name) and not HARMLESS.match(name):
             raise self.fail(line, f"the card {name} is not known here; write the mesh without it")
 
     def tell_sections(self) -> None:
-        """Warn of elements thinner than a body that have a property: they stiffen no body."""
+        """Warn of elements thinner than a body that have a property: they stiffen no body. Warn of
+        the thickness of elements in the plane, which a scene gives.
+        """
         thin: tuple[str, ...] = "line", "tri", "quad"
         if all(kind.startswith(thin) for kind in self.elements):
             thin = ("line",)
         for kind, rows in self.elements.items():
-            lines = [line for line, group, _ in rows if group in self.sections]
-            if kind.startswith(thin) and lines:
+            own = [(line, self.sections[prop]) for line, prop, _ in rows if prop in self.sections]
+            if kind.startswith(thin) and own:
                 said = "%s, line %d: the stiffness of %s of type %s is left out"
-                log.warning(said, self.path, lines[0], count(len(lines), "element"), kind)
+                log.warning(said, self.path, own[0][0], count(len(own), "element"), kind)
+            for depth in {depth for _, depth in own} - {1.0} if thin == ("line",) else ():
+                lines = [line for line, value in own if value == depth]
+                said = "%s, line %d: the thickness %g of %s is not read, that of the scene counts"
+                log.warning(said, self.path, lines[0], depth, count(len(lines), "element"))
 
     def _element(self, line: int, card: list[str]) -> None:
         name, first = card[0], FIRST.get(card[0], 3)
         shapes = ELEMENTS[name]
-        words = card[first : first + max(shapes)]
-        count = max(shapes) if any(words[min(shapes) :]) else min(shapes)
-        if count not in shapes or len(words) < count or not all(words[:count]):
+        words = ["" if word == "0" else word for word in card[first : first + max(shapes)]]
+        count = next(n for n in sorted(shapes) if not any(words[n:]))
+        if len(words) < count or not all(words[:count]):
             raise self.fail(line, f"the element {name} lacks some of its nodes")
         nodes = [self.whole(line, word) for word in words[:count]]
-        if name in SOLIDS and any(card[first + count :]):
+        if name in SOLIDS and any(word.strip("0") for word in card[first + count :]):
             raise self.fail(line, f"the element {name} has more than {count} nodes")
         number = self.whole(line, card[1])
         if number in self.numbers:
             raise self.fail(line, f"element {number} is there twice")
         self.numbers.add(number)
         group = self.whole(line, card[2]) if first == 3 and card[2] else 0
+        self.words.setdefault(shapes[count], f"{name} (line {line})")
         self.elements.setdefault(shapes[count], []).append((line, group, nodes))
 
 
@@ -206,7 +229,8 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str], str]]:
             return
         if line:
             yield number, fields, end
-    raise InputError(f"mesh file '{path}', line {len(lines)}: it ends before ENDDATA.")
+    said = "it ends before ENDDATA; add this line if nothing is missing"
+    raise InputError(f"mesh file '{path}', line {len(lines)}: {said}.")
 
 
 def _fields(line: str) -> tuple[list[str], str]:

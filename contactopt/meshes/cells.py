@@ -21,6 +21,8 @@ CELLS = {  # what meshio and VTK call the elements, by whether they are of secon
     "RefTri": ("triangle", "triangle6"), "RefQuad": ("quad", "quad9"),
     "RefTet": ("tetra", "tetra10"), "RefHex": ("hexahedron", "hexahedron27"),
 }  # fmt: skip
+# what scikit-fem finds of the facets and edges of elements when it is asked, and keeps in the mesh
+FOUND = ("_facets", "_t2f", "_f2t", "_edges", "_t2e", "_f2e")
 # nodes of an element of first or second order numbered the other way round, in the order of meshio
 MIRRORED = {
     "triangle": (0, 2, 1, 5, 4, 3),
@@ -38,13 +40,20 @@ def is_curved(mesh: skfem.Mesh) -> bool:
     return int(mesh.p.shape[1]) != int(mesh.nvertices)
 
 
+def knowing(mesh: skfem.Mesh, old: skfem.Mesh) -> skfem.Mesh:
+    """A mesh with the elements of an `old` one, and what is known of their facets and edges."""
+    if np.array_equal(mesh.t, old.t):
+        vars(mesh).update({name: vars(old)[name] for name in FOUND if name in vars(old)})
+    return mesh
+
+
 def straight(mesh: skfem.Mesh) -> skfem.Mesh:
     """Make the mesh of the same vertices and boundaries with straight edges."""
     if not is_curved(mesh):
         return mesh
     corners = np.ascontiguousarray(mesh.p[:, : mesh.nvertices])
-    plain = SHAPES[mesh.refdom.__name__][0](corners, mesh.t)
-    return plain.with_boundaries(mesh.boundaries) if mesh.boundaries else plain
+    plain = SHAPES[mesh.refdom.__name__][0]
+    return knowing(plain(corners, mesh.t, _boundaries=mesh.boundaries), mesh)
 
 
 def second_order(mesh: skfem.Mesh, places: np.ndarray) -> skfem.Mesh:
@@ -88,11 +97,16 @@ def facet_nodes(mesh: skfem.Mesh, facets: np.ndarray) -> np.ndarray:
     return np.unique(mesh.dofs.get_facet_dofs(facets).flatten())
 
 
-def volumes(mesh: skfem.Mesh) -> np.ndarray:
-    """Signed volumes (e, n + 1) over those of the reference, at n nodes and the centre of cells."""
-    places = np.asarray(mesh.elem().doflocs).T
+def volumes(mesh: skfem.Mesh, nodes: np.ndarray | None = None) -> np.ndarray:
+    """Signed volumes (e, n + 1) over those of the reference, at n nodes and the centre of cells
+    with `nodes` at (dim, n, e), by default those of the mesh.
+    """
+    nodes = mesh.doflocs[:, mesh.dofs.element_dofs] if nodes is None else nodes
+    shape = mesh.elem()
+    places = np.asarray(shape.doflocs).T
     places = np.concatenate([places, places.mean(axis=1, keepdims=True)], axis=1)
-    return np.asarray(np.linalg.det(np.asarray(mesh._mapping().DF(places)).transpose(2, 3, 0, 1)))
+    slopes = np.stack([shape.lbasis(places, i)[1] for i in range(nodes.shape[1])])
+    return np.linalg.det(np.einsum("aie,ibq->eqab", nodes, slopes, optimize=True))
 
 
 def overlapping(mesh: skfem.Mesh) -> int | None:

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from contactopt.errors import Damaged
-from contactopt.meshes.inp_elements import FACES, FACET
+from contactopt.errors import Damaged, InputError
+from contactopt.meshes.inp_elements import CORNERS, FACES, FACET
 
 # type without its number of nodes -> that number -> type in meshio
 TYPES = {
@@ -23,7 +23,7 @@ TYPES = {
     "TET": {4: "tetra", 10: "tetra10"},
     "HEX": {8: "hexahedron", 20: "hexahedron20", 27: "hexahedron27"},
     "SHE": {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"},
-    "WED": {6: "wedge"}, "PYR": {5: "pyramid"},
+    "WED": {6: "wedge", 15: "wedge"}, "PYR": {5: "pyramid", 13: "pyramid"},
     **{name: {2: "line", 3: "line3"} for name in ("BAR", "BEA", "TRU", "EDG")},
     "SPH": {1: "vertex"}, "CIR": {1: "vertex"},
 }  # fmt: skip
@@ -36,7 +36,8 @@ HEXAHEDRON = [*range(12), 16, 17, 18, 19, 12, 13, 14, 15, 23, 24, 25, 26, 21, 22
 def read_exodus(path: Path) -> Any:
     """The mesh of a file, with blocks and side sets as sets of elements.
 
-    Damaged, KeyError, IndexError or OSError where the file does not keep to the format.
+    InputError for elements that are not known; Damaged, KeyError, IndexError or OSError where the
+    file does not keep to the format.
     """
     head = path.read_bytes()[:4]
     if head == b"CDF\5":
@@ -45,16 +46,16 @@ def read_exodus(path: Path) -> Any:
         from scipy.io import netcdf_file
 
         with netcdf_file(path, mmap=False) as file:
-            return _mesh(file.variables, lambda variable: variable.elem_type)
+            return _mesh(path, file.variables, lambda variable: variable.elem_type)
     try:
         import h5py
     except ImportError as error:
         raise Damaged("it is of HDF5; pip install h5py") from error
     with h5py.File(path) as file:
-        return _mesh(file, lambda variable: variable.attrs["elem_type"])
+        return _mesh(path, file, lambda variable: variable.attrs["elem_type"])
 
 
-def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -> Any:
+def _mesh(path: Path, variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -> Any:
     import meshio
 
     if "coord" in variables:
@@ -64,19 +65,22 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
         points = np.stack([np.array(variables[axis][:], dtype=float) for axis in axes], axis=1)
     cells: list[tuple[str, np.ndarray]] = []
     sets: dict[str, dict[int, np.ndarray]] = {}
-    starts, end, shells = [], 0, set[int]()
+    starts, end, shells, words = [], 0, set[int](), dict[str, str]()
     for name, number in _named(variables, "eb", "connect", "block"):
         variable = variables[f"connect{number}"]
         nodes, text = np.array(variable[:], dtype=np.int64) - 1, type_of(variable)
-        kinds = TYPES.get((text if isinstance(text, str) else text.decode())[:3].upper(), {})
+        text = text if isinstance(text, str) else text.decode(errors="replace")
+        kinds = TYPES.get(text[:3].upper(), {})
         starts.append(end)
         end += len(nodes)
         kind = kinds.get(nodes.shape[1], "")
         if not kind:
-            raise Damaged(f"the elements of block {name!r} are of a type that is not known")
+            word = f"of type {text} with {nodes.shape[1]} nodes"
+            raise InputError(f"mesh file '{path}': elements {word}, block {name!r}, are not known.")
+        words.setdefault(kind, f"{text} (block {name!r})")
         if kind.startswith("hexahedron"):
             nodes = nodes[:, HEXAHEDRON[: nodes.shape[1]]]
-        cells.append((kind, nodes))
+        cells.append((kind, nodes[:, : CORNERS.get(kind)]))
         in_space = kind.startswith("triangle") and points.shape[1] == 3
         shells |= {len(cells) - 1} if in_space or TYPES["SHE"] is kinds else set()
         sets.setdefault(name, {})[len(cells) - 1] = np.arange(len(nodes))
@@ -103,7 +107,7 @@ def _mesh(variables: Mapping[str, Any], type_of: Callable[[Any], bytes | str]) -
     for name, number in _named(variables, "ns", "node_ns", "nodes"):
         own_nodes = np.array(variables[f"node_ns{number}"][:], dtype=np.int64) - 1
         of_points[name] = np.union1d(of_points.get(name, own_nodes), own_nodes)
-    return meshio.Mesh(points, cells, cell_sets=of_cells, point_sets=of_points)
+    return meshio.Mesh(points, cells, cell_sets=of_cells, point_sets=of_points, info=words)
 
 
 def _sides(kind: str, shell: bool) -> tuple[tuple[int, ...], ...]:

@@ -296,13 +296,16 @@ class _Patches:
         count = min(NEAREST, len(self.region))
         near = self.tree.query(points.T, k=count)[1].reshape(points.shape[1], count)
         outside = barycentric(self.frames, near, points)[1]
-        order = np.argsort(outside + PREFER * (self.region[near] < 0), axis=1)
-        ranked = np.take_along_axis(near, order, axis=1).T
-        found, within = self._on(points, ranked[0])
+        outside = outside + PREFER * (self.region[near] < 0)
+        best = near[np.arange(len(near)), np.argmin(outside, axis=1)]
+        found, within = self._on(points, best)
         # a point of one patch may lie above the triangle of its neighbour
-        for other in ranked[1:TRIED]:
-            some = np.flatnonzero(~within & (self.region[other] == self.region[ranked[0]]))
-            there = self._on(points[:, some], other[some])[0]
+        left = np.flatnonzero(~within)
+        order = np.argsort(outside[left], axis=1)[:, 1:TRIED]
+        for others in np.take_along_axis(near[left], order, axis=1).T:
+            mine = self.region[others] == self.region[best[left]]
+            some, other = left[mine], others[mine]
+            there = self._on(points[:, some], other)[0]
             away = [np.linalg.norm(x - points[:, some], axis=0) for x in (there, found[:, some])]
             nearer = away[0] < away[1]
             found[:, some[nearer]] = there[:, nearer]

@@ -28,7 +28,7 @@ from contactopt.checks import place_words
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes import inp_generation
-from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of
+from contactopt.meshes.inp_elements import CORNERS, dimension, facets, kind_of, words_of
 from contactopt.meshes.inp_text import LARGEST, SECTIONS, Block, Later, Named, bare, blocks, set_of
 from contactopt.meshes.mesh_repair import in_order
 
@@ -89,17 +89,12 @@ def read_inp(path: Path) -> Any:
     of_points = {n: np.searchsorted(tags, sorted(f)) for n, f in whole.node_sets.items()}
     rows = [(kind, np.searchsorted(tags, nodes)) for kind, nodes, _ in cells]
     rows = [(k, in_order(points, n) if k == "hexahedron27" else n) for k, n in rows]
-    return meshio.Mesh(points, rows, cell_sets=of_cells, point_sets=of_points)
+    sets = {"cell_sets": of_cells, "point_sets": of_points}
+    return meshio.Mesh(points, rows, **sets, info=words_of(whole))
 
 
 def _places(ids: np.ndarray, found: Iterable[int]) -> np.ndarray:
     return np.flatnonzero(np.isin(ids, np.fromiter(found, np.int64)))
-
-
-def _thickness(block: Block) -> float:
-    """The number below a section of plane elements, 1 without one."""
-    solid = [(line, words[0]) for line, words in block.rows if block.keyword == "solidsection"]
-    return block.real(*solid[0]) if solid and solid[0][1] else 1.0
 
 
 def _instance(parts: dict[str, Scope], block: Block) -> Scope:
@@ -217,11 +212,8 @@ class Scope:
             lost = np.argwhere(~np.isin(nodes, known) & (nodes > 0 if not kind else True))
             if len(lost):
                 block, line = where[lost[0, 0]]
-                raise block.fail(
-                    f"an element {block.options.get('type', '')} names a node that is not there,"
-                    f" {nodes[tuple(lost[0])]}",
-                    line,
-                )
+                said = f"an element {block.options.get('type', '')} names a node that is not there,"
+                raise block.fail(f"{said} {nodes[tuple(lost[0])]}", line)
         both: Any = ((self.node_sets, self.nodes, "node"), (self.element_sets, self.elements, ""))
         for sets, there, what in both:
             for name, found in sets.items():
@@ -246,8 +238,8 @@ class Scope:
                 if many and 0 < dimension(self.types[place]) < most:
                     said = "the stiffness of %s %s is left out"
                     block.warn(said, count(many, "element"), self.types[place])
-                elif many and most == 2 and (depth := _thickness(block)) != 1:
-                    said = "the thickness %g of %s %s is left out; give it to the scene"
+                elif many and most == 2 and (depth := block.thickness()) != 1:
+                    said = "the thickness %g of %s %s is not read, that of the scene counts"
                     block.warn(said, depth, count(many, "element"), self.types[place])
 
     def node(self, block: Block) -> None:
@@ -286,12 +278,14 @@ class Scope:
             if not rows or not kind or len(rows[-1]) == 1 + nodes:
                 rows.append([])
                 where.append((block, line))
+            if named[0] == "B" and len(words) == 2 + nodes:  # the last directs the section
+                words = words[:-1]
             rows[-1] += [block.whole(line, word) for word in words]
             if kind and len(rows[-1]) > 1 + nodes:
                 raise block.fail(f"an element {named} has a number and {nodes} nodes", line)
         if kind and rows and len(rows[-1]) < 1 + nodes:
             raise block.fail(f"an element {named} lacks some of its {nodes} nodes", where[-1][1])
-        width = max((len(row) for row in rows), default=1)
+        width = max((len(row) for row in rows), default=1 + nodes)
         table = np.array([row + [0] * (width - len(row)) for row in rows], dtype=np.int64)
         table = table.reshape(-1, width)
         if kind == "line3":  # the middle is in the middle here, and at the end in meshio

@@ -80,6 +80,17 @@ def dimension(named: str) -> int:
     return {"solid": 3, "plane": 2, "shell": 2, "line": 1, "point": 0}[_fit(named)[0]]
 
 
+def words_of(scope: Scope) -> dict[str, str]:
+    """Shape in meshio -> the type of its first elements in the file, and their line."""
+    found: dict[str, str] = {}
+    for place, (kind, _, _, where) in enumerate(scope.blocks):
+        if where:
+            block, line = where[0]
+            at = block.source.named(line)[1]
+            found.setdefault(kind, f"{scope.types[place]} (line {at})")
+    return found
+
+
 def side_of(named: str, label: str, dim: int) -> tuple[tuple[int, ...], ...] | None:
     """The corners of the facets that a label means, in a file whose bodies have a dimension. None
     where it means none. Without a label it means all sides of an element of a body. What is thinner

@@ -39,11 +39,11 @@ READ = {
     "endpart": "", "endassembly": "", "endinstance": "",
 }  # fmt: skip
 # keywords that give elements a stiffness, with any options
-SECTIONS = {
-    *("beamsection", "beamgeneralsection", "framesection", "membranesection"),
-    *("shellsection", "shellgeneralsection", "solidsection"),
-}
-STIFFENING = {"foundation", "rebar", "rebarlayer"}  # keywords of what elements do not show
+THICK = {"membranesection", "shellsection", "solidsection"}  # the first number below is a thickness
+SECTIONS = THICK | {"beamsection", "beamgeneralsection", "framesection", "shellgeneralsection"}
+# keywords of what elements do not show, foundations and links between nodes
+STIFFENING = {"foundation", "rebar", "rebarlayer", "equation", "mpc", "coupling", "rigidbody"}
+STIFFENING |= {"kinematiccoupling", "distributingcoupling", "embeddedelement"}
 DEEPEST = 10  # files that include each other
 LARGEST = 2**31  # numbers of nodes, elements and lines are smaller
 OPEN = "a quotation mark is not closed"
@@ -61,6 +61,7 @@ class Source:
 
     files: list[Path]
     depths: list[int]  # how many files include each
+    told: set[str] = field(default_factory=set)  # keywords of which a warning was given
 
     def open(self, path: Path, depth: int) -> list[tuple[int, str]]:
         """The lines of another file, the last one first, by their numbers."""
@@ -79,7 +80,7 @@ class Block:
 
     source   the files of the deck;  place  of the keyword in it
     keyword  in lower case, without blanks;  options  value by name
-    rows     the rows of data, each with its place
+    rows     the rows of data, each with its place;  title  the keyword as messages name it
     """
 
     source: Source
@@ -87,6 +88,7 @@ class Block:
     keyword: str
     options: dict[str, str]
     rows: list[Row] = field(default_factory=list)
+    title: str = ""
 
     def fail(
         self, message: str, place: int | None = None, error: type[InputError] = InputError
@@ -103,7 +105,7 @@ class Block:
     def need(self, option: str) -> str:
         """The value of an option that must be there."""
         if not self.options.get(option):
-            raise self.fail(f"*{self.keyword.upper()} lacks the option {option.upper()}=")
+            raise self.fail(f"*{self.title} lacks the option {option.upper()}=")
         return self.options[option]
 
     def whole(self, place: int, word: str) -> int:
@@ -125,6 +127,12 @@ class Block:
             why = "is no number" if math.isnan(value) else f"is not below {FAR:g}"
             raise self.fail(f"{word[:40]!r} {why}", place)
         return value
+
+    def thickness(self) -> float:
+        """The number below a section of elements in the plane or of shells, 1 without one."""
+        plain = self.keyword in THICK and "composite" not in self.options
+        first = [(line, words[0]) for line, words in self.rows if plain and words[0]]
+        return self.real(*first[0]) if first else 1.0
 
 
 Named = dict[int, tuple[Block, int] | None]  # numbers, each with where it is named if it must exist
@@ -154,7 +162,7 @@ def blocks(path: Path) -> Iterator[Block]:
         first, *words = _words(text[1:])
         pairs = (word.partition("=") for word in words if word)
         options = {bare(key): value.strip().strip('"').strip() for key, _, value in pairs}
-        found = Block(source, place, bare(first), options)
+        found = Block(source, place, bare(first), options, title=first.upper())
         if found.keyword == "include":  # its data may be those of the block before
             lines += _other(found)
             continue
@@ -191,14 +199,15 @@ def _known(block: Block, stepping: bool) -> Iterator[Block]:
     if block.keyword in SECTIONS:
         yield block
         return
-    if block.keyword in STIFFENING:
-        block.warn("the stiffness of *%s is left out", block.keyword.upper())
+    if block.keyword in STIFFENING and block.keyword not in block.source.told:
+        block.source.told.add(block.keyword)
+        block.warn("the stiffness of *%s is left out", block.title)
     if block.keyword == "modelchange" and block.options.get("type", "element").lower() == "element":
         raise block.fail("*MODEL CHANGE of elements is not read; write the mesh that is meant")
     if block.keyword not in READ:
         if not stepping and block.keyword not in harmless():
             raise block.fail(
-                f"the keyword *{block.keyword.upper()} is not known here, and the mesh may"
+                f"the keyword *{block.title} is not known here, and the mesh may"
                 " depend on it; write the mesh without it"
             )
         return
@@ -215,7 +224,7 @@ def _check_options(block: Block) -> None:
     for option in block.options:
         if option not in READ[block.keyword].split():
             raise block.fail(
-                f"the option {option.upper()} of *{block.keyword.upper()} is not known here; write"
+                f"the option {option.upper()} of *{block.title} is not known here; write"
                 " the mesh without it"
             )
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from skfem import Mesh
 
-from contactopt.errors import Damaged
+from contactopt.errors import Damaged, InputError
 from contactopt.meshes.cells import mirrored
 from contactopt.meshes.mesh_repair import in_order
 
@@ -37,7 +37,7 @@ def read_med(path: Path) -> Any:
         if "NOE" not in mesh:
             (step,) = _one(mesh, "steps of a mesh")
             mesh = mesh[step]
-        return _mesh(mesh, file["ENS_MAA"][name].attrs["ESP"], file.get(f"FAS/{name}", {}))
+        return _mesh(path, mesh, file["ENS_MAA"][name].attrs["ESP"], file.get(f"FAS/{name}", {}))
 
 
 def _one(group: Collection[str], what: str) -> list[str]:
@@ -46,7 +46,7 @@ def _one(group: Collection[str], what: str) -> list[str]:
     return list(group)
 
 
-def _mesh(mesh: Mesh, dim: int, families: h5py.Group) -> meshio.Mesh:
+def _mesh(path: Path, mesh: Mesh, dim: int, families: h5py.Group) -> meshio.Mesh:
     import meshio
     from meshio.med._med import med_to_meshio_type
 
@@ -55,7 +55,7 @@ def _mesh(mesh: Mesh, dim: int, families: h5py.Group) -> meshio.Mesh:
     cells, tags = [], []
     for med, own in mesh["MAI"].items():
         if med not in kinds:
-            raise Damaged(f"elements of type {med} are not known")
+            raise InputError(f"mesh file '{path}': elements of type {med} are not known here.")
         nodes = own["NOD"][()].reshape(-1, int(own["NOD"].attrs["NBR"])) - 1
         kind = kinds[med]
         nodes = mirrored(kind, nodes) if kind.startswith(("tetra", "hexahedron")) else nodes
@@ -69,7 +69,8 @@ def _mesh(mesh: Mesh, dim: int, families: h5py.Group) -> meshio.Mesh:
         name: [np.flatnonzero(np.isin(own, numbers)) for own in tags]
         for name, numbers in _groups(families, "ELEME").items()
     }
-    return meshio.Mesh(places, cells, cell_sets=sets, point_sets=nodes_of)
+    words = {kinds[med]: f"{kinds[med]} ({med} of MED)" for med in mesh["MAI"]}
+    return meshio.Mesh(places, cells, cell_sets=sets, point_sets=nodes_of, info=words)
 
 
 def _groups(families: h5py.Group, kind: str) -> dict[str, list[int]]:

@@ -58,7 +58,8 @@ def read_medit(path: Path) -> Any:
             raise InputError(f"{said}; save it as .msh or .inp.")
     if not len(points):
         raise Damaged("it has no vertices")
-    return meshio.Mesh(points, cells, cell_data={"medit:ref": references})
+    called = {kind: f"{kind} ({name.title()} of Medit)" for name, (kind, _) in KINDS.items()}
+    return meshio.Mesh(points, cells, cell_data={"medit:ref": references}, info=called)
 
 
 def _table(name: str, body: list[str], width: int) -> np.ndarray:

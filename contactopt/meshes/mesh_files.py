@@ -14,7 +14,7 @@ import numpy as np
 import skfem
 
 from contactopt.cards import count
-from contactopt.checks import LARGEST, check_number, overheard, place_words, remember
+from contactopt.checks import LARGEST, RINGS, check_number, overheard, place_words, remember
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import facets_at
@@ -57,7 +57,7 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     with overheard() as told:
         groups = read_groups(Path(path))
         _tell_others(Path(path), groups)
-        return remember(_body(Path(path), groups, group, scale), told)
+        return remember(_body(Path(path), groups, group, scale), told + _rings(Path(path), groups))
 
 
 def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
@@ -81,10 +81,16 @@ def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
             refused.append(f"group {group!r} is {how} {larger!r}")
             continue
         try:
-            found[group] = _body(path, groups, group, 1.0)
+            found[group] = remember(_body(path, groups, group, 1.0), _rings(path, groups))
         except InputError as error:
             refused.append(f"group {group!r}: {error}" if group else str(error))
     return {group: found[group] for group in names if group in found}, refused
+
+
+def _rings(path: Path, groups: FileGroups) -> list[str]:
+    """A remark for scenes that are not axisymmetric where the elements of the file are."""
+    own = [word for word in groups.words.values() if word.startswith(("CAX", "CGAX", "DCAX"))]
+    return [f"{path}: elements of type {own[0]} {RINGS}"] if own else []
 
 
 def _numbers(members: Mapping[int, np.ndarray]) -> np.ndarray:
@@ -199,19 +205,17 @@ def _elements(
             if len(chosen):
                 found.setdefault(kind, []).append((nodes[chosen], chosen + before.get(kind, 0)))
             before[kind] = before.get(kind, 0) + len(nodes)
-    for kind in found:
-        if kind not in CORNERS:
-            raise InputError(
-                f"mesh file '{path}': elements of type {kind!r} cannot be used; make triangles,"
-                " quadrilaterals, tetrahedra or hexahedra of first or second order."
-            )
-    if len(found) != 1:
-        pure = [n for n in groups.names(dim) if group is None and len(_kinds(groups, n, dim)) == 1]
+    other = next((kind for kind in found if kind not in CORNERS), "")
+    if other or len(found) != 1:
+        kinds = {name: _kinds(groups, name, dim) for name in groups.names(dim) if group is None}
+        pure = [name for name, own in kinds.items() if len(own) == 1 and own <= CORNERS.keys()]
+        fault = f"elements of type {groups.words.get(other, repr(other))} cannot be used; make"
+        fault += " triangles, quadrilaterals, tetrahedra or hexahedra of first or second order"
+        if not other:
+            words = " and ".join(groups.words.get(kind, kind) for kind in found)
+            fault = f"the body mixes elements of type {words}; make all of one type"
         choice = f", or choose one of its groups: {', '.join(pure)}" if pure else ""
-        raise InputError(
-            f"mesh file '{path}': the body mixes elements of type {' and '.join(found)}; make all"
-            f" of one type{choice}."
-        )
+        raise InputError(f"mesh file '{path}': {fault}{choice}.")
     ((kind, parts),) = found.items()
     nodes, numbers = (np.concatenate(each) for each in zip(*parts))
     return complete(Cells(path, kind, points, nodes.T.astype(np.int64), numbers))
@@ -304,11 +308,11 @@ def _tell_others(path: Path, groups: FileGroups) -> None:
         for face in FACES.get(kind.rstrip("0123456789"), ()) if dims == dim else ():
             sides.append(key[nodes[:, list(face)]].sum(axis=1))
             sides += [key[nodes[:, [i, j]]].sum(axis=1) for i, j in zip(face, face[-1:] + face)]
-    known, lost = np.unique(np.concatenate(sides)), {1: 0, 2: 0}
+    known, lost = np.unique(np.concatenate(sides)), {1: set[int](), 2: set[int]()}
     for kind, nodes, dims in others:
         corners = nodes[:, : 2 if dims == 1 else CORNERS.get(kind, nodes.shape[1])]
-        lost[dims] += int(np.count_nonzero(~np.isin(key[corners].sum(axis=1), known)))
+        lost[dims].update(np.setdiff1d(key[corners].sum(axis=1), known).tolist())
     for dims, what in ((1, "line"), (2, "shell")):
         if lost[dims]:
             said = "%s: %s off the sides and edges of all elements of bodies, left out"
-            log.warning(said, path, count(lost[dims], what))
+            log.warning(said, path, count(len(lost[dims]), what))

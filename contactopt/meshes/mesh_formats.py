@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 
 from contactopt.errors import Damaged, InputError
-from contactopt.meshes.bulk_data import read_bulk_data
+from contactopt.meshes.bulk_data import is_bulk_data, read_bulk_data
+from contactopt.meshes.cad import ENDINGS
 from contactopt.meshes.exodus import read_exodus
 from contactopt.meshes.inp import read_inp
 from contactopt.meshes.med import read_med
@@ -66,12 +67,14 @@ class FileGroups:
     members     (name, dimension) -> for each block the numbers of those elements that belong to the
                 group
     point_sets  name -> nodes
+    words       type in meshio -> what the file calls it, and where, if that is known
     """
 
     points: np.ndarray
     blocks: tuple[tuple[str, np.ndarray, int], ...]
     members: Mapping[tuple[str, int], Mapping[int, np.ndarray]]
     point_sets: Mapping[str, np.ndarray]
+    words: Mapping[str, str]
 
     def names(self, dim: int) -> list[str]:
         """Names of the groups of elements of a dimension."""
@@ -84,8 +87,8 @@ def read_groups(path: Path) -> FileGroups:
     """
     mesh = _read(path)
     blocks = tuple((block.type, np.asarray(block.data), int(block.dim)) for block in mesh.cells)
-    if not any(len(nodes) for _, nodes, _ in blocks):
-        raise InputError(f"mesh file '{path}': it holds no elements.")
+    if not any(len(nodes) for _, nodes, _ in blocks) or np.ndim(mesh.points) != 2:
+        raise InputError(f"mesh file '{path}': it holds no elements, or no nodes.")
     for kind, nodes, _ in blocks:
         if nodes.size and (nodes.min() < 0 or nodes.max() >= len(mesh.points)):
             raise InputError(f"mesh file '{path}': a {kind} names a node that is not there.")
@@ -104,7 +107,9 @@ def read_groups(path: Path) -> FileGroups:
     numbered = {k: value for k, value in mesh.field_data.items() if np.shape(value) == (2,)}
     named = {(int(tag), int(dim)): name for name, (tag, dim) in numbered.items()}
     for key, arrays in mesh.cell_data.items():
-        for i, values in enumerate(np.asarray(array) for array in arrays):
+        for i, array in enumerate(arrays):
+            values = np.asarray(array)
+            values = values[:, 0] if values.shape[1:] == (1,) else values
             if key == "gmsh:geometrical" or values.dtype.kind not in "iu" or values.ndim != 1:
                 continue
             for tag in np.unique(values):
@@ -114,18 +119,15 @@ def read_groups(path: Path) -> FileGroups:
                 for name in own if tag != 0 or key not in TAGS else ():
                     add(name, i, np.flatnonzero(values == tag))
     sets = {name: np.asarray(nodes, dtype=int) for name, nodes in mesh.point_sets.items()}
-    for name, found in sets.items():
-        if found.size and (found.min() < 0 or found.max() >= len(mesh.points)):
-            raise InputError(
-                f"mesh file '{path}': the set {name!r} names a node that is not there."
-            )
+    named_by = [(name, found, "a node", len(mesh.points)) for name, found in sets.items()]
     for (name, _), parts in members.items():
-        for i, found in parts.items():
-            if found.min() < 0 or found.max() >= len(blocks[i][1]):
-                raise InputError(
-                    f"mesh file '{path}': the set {name!r} names an element that is not there."
-                )
-    return FileGroups(np.asarray(mesh.points), blocks, members, sets)
+        named_by += [(name, own, "an element", len(blocks[i][1])) for i, own in parts.items()]
+    for name, found, what, size in named_by:
+        if found.size and (found.min() < 0 or found.max() >= size):
+            raise InputError(
+                f"mesh file '{path}': the set {name!r} names {what} that is not there."
+            )
+    return FileGroups(np.asarray(mesh.points), blocks, members, sets, mesh.info or {})
 
 
 def _read(path: Path) -> Any:
@@ -143,11 +145,13 @@ def _read(path: Path) -> Any:
         )
     endings = ["".join(path.suffixes[-n:]).lower() for n in range(len(path.suffixes), 0, -1)]
     formats = [name for ending in endings for name in meshio.extension_to_filetypes.get(ending, ())]
+    if path.suffix.lower() == ".dat" and is_bulk_data(path):
+        formats = ["nastran"]
     if not formats:
-        raise InputError(
-            f"mesh file '{path}': its ending names no format of meshio; use .msh (Gmsh), .vtu, .inp"
-            " (Abaqus, CalculiX), ..."
-        )
+        what = "it is a part of a CAD program, of which `contactopt mesh` makes a mesh"
+        if path.suffix.lower() not in ENDINGS:
+            what = "its ending names no format of meshio; use .msh, .vtu or .inp, for example"
+        raise InputError(f"mesh file '{path}': {what}.")
     said = ""
     for reader in _readers(path, formats, size):
         printed = io.StringIO()
@@ -181,6 +185,8 @@ def _words(error: BaseException, printed: str) -> str:
 
 def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[], Any]]:
     """The reader of each attempt."""
+    import meshio
+
     stated = version(path)[0] if "gmsh" in formats else None
     if stated is not None:
         if stated != "4.1" and stated.partition(".")[0] != "2":
@@ -194,15 +200,9 @@ def _readers(path: Path, formats: list[str], size: int) -> Iterator[Callable[[],
         if name in OWN and path.suffix != ".meshb":
             yield partial(OWN[name], path)
         elif name in SAFE:
-            yield partial(_read_here, path, name, size)
+            yield partial(meshio.read, path, file_format=name)
         else:
             yield partial(_read_apart, path, name, size)
-
-
-def _read_here(path: Path, name: str, size: int) -> Any:
-    import meshio
-
-    return meshio.read(path, file_format=name)
 
 
 def _read_apart(path: Path, name: str, size: int) -> Any:

@@ -26,6 +26,7 @@ from contactopt.meshes.cells import (
     CURVED,
     area_vectors,
     is_curved,
+    knowing,
     outer_corners,
     straight,
     volumes,
@@ -148,10 +149,12 @@ def _present(mesh: Mesh, curves: Curves) -> dict[str, Function]:
 
 def _unfolded(mesh: Mesh, points: np.ndarray) -> Any:
     """The mesh with its nodes at `points`, but for those that would turn an element inside out."""
-    nodes, before = np.asarray(mesh.dofs.element_dofs if is_curved(mesh) else mesh.t), volumes(mesh)
+    nodes = np.asarray(mesh.dofs.element_dofs if is_curved(mesh) else mesh.t)
+    nodes = nodes[:, np.any(points != mesh.doflocs, axis=0)[nodes].any(axis=0)]
+    before = volumes(mesh, mesh.doflocs[:, nodes])
     sense, least = np.sign(before[:, -1:]), FLAT * np.abs(before).min(axis=1)
     points, kept = points.copy(), 0
-    while (bad := (volumes(replace(mesh, doflocs=points)) * sense).min(axis=1) < least).any():
+    while (bad := (volumes(mesh, points[:, nodes]) * sense).min(axis=1) < least).any():
         back = np.unique(nodes[:, bad])
         back = back[np.any(points[:, back] != mesh.doflocs[:, back], axis=0)]
         if not len(back):
@@ -160,7 +163,7 @@ def _unfolded(mesh: Mesh, points: np.ndarray) -> Any:
     if kept:
         said = "%s off the curved boundary, where it would turn elements inside out"
         log.warning(said, count(kept, "node stays", "nodes stay"))
-    return replace(mesh, doflocs=points)
+    return knowing(replace(mesh, doflocs=points), mesh)
 
 
 def bent(mesh: Mesh, curves: Curves) -> Any:
@@ -173,13 +176,13 @@ def bent(mesh: Mesh, curves: Curves) -> Any:
     known = {name: (facets_of(mesh, name), curve) for name, curve in _present(mesh, curves).items()}
     if not known:
         return mesh
-    flat = replace(mesh, _boundaries=None, _subdomains=None)
-    made = CURVED[mesh.refdom.__name__].from_mesh(flat)
+    flat = knowing(replace(mesh, _boundaries=None, _subdomains=None), mesh)
+    made = knowing(CURVED[mesh.refdom.__name__].from_mesh(flat), flat)
     shift, plane = np.zeros_like(made.doflocs), len(mesh.p) == 2
-    edges = mesh.facets if plane else mesh.edges
+    edges = flat.facets if plane else flat.edges
     middle = (made.dofs.facet_dofs if plane else made.dofs.edge_dofs)[0]
     for facets, curve in known.values():
-        mine = facets if plane else np.unique(mesh.f2e[:, facets])
+        mine = facets if plane else np.unique(flat.f2e[:, facets])
         ends = mesh.p[:, edges[:, mine]]
         _shift(shift, middle[mine], ends, np.linalg.norm(ends[:, 1] - ends[:, 0], axis=0), curve)
     # the node within a face or an element follows those around it
@@ -194,7 +197,8 @@ def bent(mesh: Mesh, curves: Curves) -> Any:
             _shift(shift, faces[facets], corners, np.ptp(corners, axis=1).max(axis=0), curve)
         local = shift[:, within]
         shift[:, within[26]] = local[:, 20:26].sum(axis=1) / 2 - local[:, 8:20].sum(axis=1) / 4
-    return replace(_unfolded(made, made.doflocs + shift), _boundaries=mesh.boundaries)
+    made = _unfolded(made, made.doflocs + shift)
+    return knowing(replace(made, _boundaries=mesh.boundaries), made)
 
 
 def slivers(mesh: Mesh, curves: Curves) -> np.ndarray:

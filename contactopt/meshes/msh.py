@@ -45,7 +45,7 @@ def read_msh4(path: Path) -> Any:
     for _ in range(reader.head()):
         dim, entity, kind = reader.take(3).tolist()
         count = reader.count()
-        width = 1 + _nodes_of(kind)
+        width = 1 + _size_of(kind)[0]
         rows = reader.take(count * width, "u8").reshape(count, width)
         blocks.append((kind, rows[:, 1:]))
         members.append(groups.get((dim, entity), []))
@@ -82,9 +82,10 @@ def read_msh2(path: Path) -> Any:
     sets: dict[str, list[np.ndarray]] = {}
     for i, (kind, rows) in enumerate(table.items()):
         for tag in np.unique(rows[rows[:, 0] > 0, 0]).tolist():
-            name = names.get((_dimension_of(kind), tag), str(tag))
+            name = names.get((_size_of(kind)[1], tag), str(tag))
             none = [np.arange(0) for _ in table]
-            sets.setdefault(name, none)[i] = np.flatnonzero(rows[:, 0] == tag)
+            parts = sets.setdefault(name, none)  # groups may share a name
+            parts[i] = np.append(parts[i], np.flatnonzero(rows[:, 0] == tag))
     return _mesh(points, tags, [(kind, rows[:, 1:]) for kind, rows in table.items()], sets)
 
 
@@ -101,20 +102,14 @@ def _parametric(reader: _Numbers) -> tuple[np.ndarray, np.ndarray]:
     return table[:, 0].astype(np.int64), table[:, 1:]
 
 
-def _dimension_of(kind: int) -> int:
-    """Dimension of an element of a kind of Gmsh."""
+def _size_of(kind: int) -> tuple[int, int]:
+    """Number of nodes and dimension of an element of a kind of Gmsh."""
+    from meshio._common import num_nodes_per_cell
     from meshio._mesh import topological_dimension
     from meshio.gmsh.common import _gmsh_to_meshio_type
 
-    return int(topological_dimension[_gmsh_to_meshio_type[kind]])
-
-
-def _nodes_of(kind: int) -> int:
-    """Number of nodes of an element of a kind of Gmsh."""
-    from meshio._common import num_nodes_per_cell
-    from meshio.gmsh.common import _gmsh_to_meshio_type
-
-    return int(num_nodes_per_cell[_gmsh_to_meshio_type[kind]])
+    name = _gmsh_to_meshio_type[kind]
+    return int(num_nodes_per_cell[name]), int(topological_dimension[name])
 
 
 def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any:
@@ -126,14 +121,15 @@ def _mesh(points: np.ndarray, tags: np.ndarray, blocks: list, sets: dict) -> Any
     twice = np.flatnonzero(np.diff(tags[order]) == 0)
     if (points[order[twice]] != points[order[twice + 1]]).any():
         raise Damaged(f"node {tags[order[twice[0]]]} is there twice")
-    cells = []
+    cells, words = [], {}
     for kind, rows in blocks:
         place = np.searchsorted(tags, rows, sorter=order)
         if rows.size and (place.max() == len(tags) or (tags[order[place]] != rows).any()):
             raise Damaged("an element names a node that is not there")
         name = _gmsh_to_meshio_type[kind]
+        words[name] = f"{name} (number {kind} of Gmsh)"
         cells.append((name, _gmsh_to_meshio_order(name, order[place])))
-    return meshio.Mesh(points, cells, cell_sets=sets)
+    return meshio.Mesh(points, cells, cell_sets=sets, info=words)
 
 
 class _Numbers:
@@ -174,7 +170,7 @@ class _Numbers:
         self.place = first
         while count and len(flat) > 2:
             kind, tags = flat[1:3].tolist()
-            width = 3 + tags + _nodes_of(kind)
+            width = 3 + tags + _size_of(kind)[0]
             rows = flat[: min(count, size, len(flat) // width) * width].reshape(-1, width)
             alike = (rows[:, 1] == kind) & (rows[:, 2] == tags)
             own = len(rows) if alike.all() else int(np.argmin(alike))
@@ -222,7 +218,7 @@ class _Bytes(_Numbers):
     def elements(self, count: int) -> Iterator[tuple[int, int, np.ndarray]]:
         while count > 0:
             kind, own, tags = self.take(3).tolist()
-            width = 1 + tags + _nodes_of(kind)
+            width = 1 + tags + _size_of(kind)[0]
             if min(own, tags + 1) < 1:
                 return
             yield kind, tags, self.take(own * width).reshape(own, width)[:, 1:]

@@ -59,4 +59,5 @@ def read_su2(path: Path) -> Any:
                 rows[kind].append(nodes[:width])
     cells = [(kind, np.array(own)) for kind, own in rows.items() if own]
     groups = {n: [np.array(own.get(k, ()), dtype=int) for k, _ in cells] for n, own in sets.items()}
-    return meshio.Mesh(points, cells, cell_sets=groups)
+    words = {kind: f"{kind} (number {own} of SU2)" for own, (kind, _) in KINDS.items()}
+    return meshio.Mesh(points, cells, cell_sets=groups, info=words)

@@ -83,8 +83,8 @@ LAST_LOOSEST = 0.5  # bound of it
 
 # Newton's steps from products with Q (contactopt.methods.newton, contactopt.methods.kernels.krylov,
 # .linearised).
-KRYLOV_FIRST = 1e-2  # accuracy of the first step
-LOOSEST, TIGHTEST = 0.1, 1e-4  # bounds of the accuracy of the others, and on nested grids
+KRYLOV_LOOSEST = 1e-2  # accuracy of the first step, and the loosest of the others
+TIGHTEST = 1e-4  # lower bound of the accuracy of the others, and on nested grids
 PRODUCT_SHARE = 0.05  # accuracy of products, over that of the step
 MODEL_STEP = 1e-3  # accuracy of the same step for the model of Q, over that of the step
 MODEL_PRODUCTS = 1e-4  # accuracy of the products that make the model
@@ -96,6 +96,7 @@ SUCCESS = 1e-2  # residual of a proximal step, over the one it began with, at wh
 WEIGHT_FALL, WEIGHT_RISE = 4.0, 8.0  # of the proximal weight after a step taken, and not taken
 
 # Newton's steps on contact and bodies at once (contactopt.methods.kernels.coupled_newton).
+LOOSEST = 0.1  # upper bound of the accuracy of the steps here and on nested grids
 COUPLED_FIRST = 0.1  # accuracy of the bonded solution and of the first step
 COUPLED_TIGHTEST = 1e-2  # lower bound of the accuracy of the others
 SCHUR_STEP = 1e-2  # accuracy of the solve with the Schur complement of the model

@@ -107,11 +107,12 @@ class Contacts:
             if len(problem.pairs) > 1:
                 self.equations = coulomb_equations(problem, stiffer=P.factors[:: problem.dim])
             self.solve = Krylov(P)
-        self.accuracy = Forcing(constants.KRYLOV_FIRST, constants.LOOSEST, constants.TIGHTEST)
+        loosest = constants.KRYLOV_LOOSEST
+        self.accuracy = Forcing(loosest, loosest, constants.TIGHTEST)
 
     def begin(self, start: Iterate | None) -> Iterate:
         """The first point."""
-        return start or cold_start(self.problem, self.solve, constants.KRYLOV_FIRST)
+        return start or cold_start(self.problem, self.solve, constants.KRYLOV_LOOSEST)
 
     def evaluate(self, point: Unknowns) -> Evaluated:
         """Where products cost iterations, they are no more accurate than the step aimed at."""

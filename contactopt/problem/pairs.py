@@ -35,9 +35,9 @@ def alone(
     """The problem and solution of one pair of surfaces under the forces of all others."""
     if len(problem.pairs) == 1:
         return problem, solution
-    part, r, lam = part_of(problem, pair), solution.reactions[pair.contacts], solution.multipliers
-    apart = problem.displacements(solution.reactions, lam)[pair.contacts] - part.displacements(
-        r, lam
-    )
+    part, r, others = part_of(problem, pair), solution.reactions[pair.contacts], solution.reactions
+    others = others.copy()
+    others[pair.contacts] = 0.0
+    apart = (problem.Q @ others.ravel()).reshape(others.shape)[pair.contacts]
     own = replace(part, q=part.q + apart, s=-(part.V.T @ r.ravel()))
     return own, replace(solution, reactions=r, displacements=None)

@@ -23,7 +23,7 @@ from contactopt.meshes.curves import CORNER
 from contactopt.meshes.structured import simplices
 from contactopt.problem import Solution
 from contactopt.readings.peaks import Peak, Reading, around, at_rim, nodal_pressure
-from contactopt.readings.resultants import views
+from contactopt.readings.resultants import pair_view
 
 RISE = 1.1  # by how much the pressure at a corner exceeds that of the contacts next to it, at least
 THERE = 0.05  # of the distance of contacts, within which a node is at the place of a contact
@@ -69,16 +69,16 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
     it, and the bodies fill more than half of the angle there, and with those that other pairs join
     to them not all of it; or an empty text.
     """
-    scene, (view, own) = reduction.scene, views(reduction, solution)[number]
-    pressure, places = nodal_pressure(view.problem, own), view.problem.coordinates
+    scene, (seen, own) = reduction.scene, pair_view(reduction, solution, number)
+    pressure, places = nodal_pressure(seen.problem, own), seen.problem.coordinates
     top = int(np.argmax(pressure))
-    near = around(view.problem, top)
+    near = around(seen.problem, top)
     near = near[near != top]
     rises = len(near) > 0 and pressure[top] > max(RISE * np.max(pressure[near]), 0.0)
-    if not rises or not at_rim(view, own):
+    if not rises or not at_rim(seen, own):
         return ""
     reach = THERE * np.linalg.norm(places[:, near] - places[:, [top]], axis=0).min()
-    reach += abs(view.coupling.gap[top])
+    reach += abs(seen.coupling.gap[top])
     bodies = set(scene.pairs[number].bodies)
     joined = {name for pair in scene.pairs if bodies & {*pair.bodies} for name in pair.bodies}
 
@@ -94,7 +94,7 @@ def under_corner(reduction: Reduction, solution: Solution, number: int) -> str:
         return ""
     place = place_words(places[:, top])
     return (
-        f"the largest pressure of '{view.problem.pairs[0].name}' is under a corner near ({place}):"
+        f"the largest pressure of '{seen.problem.pairs[0].name}' is under a corner near ({place}):"
         " unless that is rounded, it is infinite, and grows with every refinement."
     )
 

@@ -37,7 +37,7 @@ from contactopt.readings.node_sets import node_reading
 from contactopt.readings.peaks import Peak, Reading, pressure_reading
 from contactopt.readings.places import PLACED, place_of, place_seeds, read_place
 from contactopt.readings.plate_motions import approach, motion
-from contactopt.readings.resultants import views
+from contactopt.readings.resultants import pair_view
 from contactopt.readings.slopes import of_pressure, of_stick, of_width
 from contactopt.readings.state import Functional, Seeds, State
 from contactopt.scenes.parameters import MATERIAL, Parameter
@@ -158,7 +158,7 @@ def _of_pair(
 def _read_pair(read: Reader, number: int, reduction: Reduction, solution: Solution) -> Reading:
     """A reading of one pair of surfaces, with contacts numbered as in the whole scene."""
     first = reduction.problem.pairs[number].start
-    found = read(*views(reduction, solution)[number])
+    found = read(*pair_view(reduction, solution, number))
     peaks = tuple(replace(peak, contacts=peak.contacts + first) for peak in found.peaks)
     return replace(found, peaks=peaks)
 

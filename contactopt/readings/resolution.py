@@ -4,10 +4,9 @@ import numpy as np
 
 from contactopt.checks import place_words
 from contactopt.coupling.reduction import Reduction
-from contactopt.problem import Solution
+from contactopt.problem import Solution, part_of
 from contactopt.problem.contact_status import contact_status
 from contactopt.readings.peaks import Reading
-from contactopt.readings.resultants import views
 
 # elements across the half-width of contact; with so few the largest pressure is some percent off
 # (reports/accuracy)
@@ -59,9 +58,10 @@ def _jumps(reduction: Reduction, solution: Solution) -> list[str]:
 def coarse(reduction: Reduction, solution: Solution) -> list[tuple[tuple[str, int], np.ndarray]]:
     """Name, number of contacts and touching ones of pairs whose zone the mesh cannot show."""
     found = []
-    for (view, own), pair in zip(views(reduction, solution), reduction.problem.pairs):
-        problem = view.problem
-        touching = np.flatnonzero(contact_status(problem, own.reactions).touching)
+    for pair in reduction.problem.pairs:
+        problem = part_of(reduction.problem, pair)
+        r = solution.reactions[pair.contacts]
+        touching = np.flatnonzero(contact_status(problem, r).touching)
         images = 2 ** int(np.sum(problem.chart.mirrored))
         strip = 2 * FEWEST if problem.dim == 2 else np.pi * FEWEST**2
         if 0 < len(touching) < problem.contacts and len(touching) * images < strip:

@@ -90,15 +90,12 @@ def holder_resultants(reduction: Reduction, solution: Solution) -> dict[str, Res
     return found
 
 
-def views(reduction: Reduction, solution: Solution) -> list[tuple[Reduction, Solution]]:
-    """The reduction and solution of every pair by itself, without displacements of the bodies."""
+def pair_view(reduction: Reduction, solution: Solution, pair: int) -> tuple[Reduction, Solution]:
+    """The reduction and solution of a pair by itself, without displacements of the bodies."""
     if len(reduction.problem.pairs) == 1:
-        return [(reduction, solution)]
-    made = []
-    for pair, coupling in zip(reduction.problem.pairs, reduction.couplings):
-        problem, own = alone(reduction.problem, solution, pair)
-        made.append((replace(reduction, problem=problem, couplings=(coupling,)), own))
-    return made
+        return reduction, solution
+    problem, own = alone(reduction.problem, solution, reduction.problem.pairs[pair])
+    return replace(reduction, problem=problem, couplings=(reduction.couplings[pair],)), own
 
 
 def resultant_words(summary: dict[str, Any]) -> dict[str, str]:
@@ -157,12 +154,11 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
     reason, and counts of contacts. 'holders': the resultant of each support and plate.
     """
     pairs, bodies = {}, {pair.name: list(pair.bodies) for pair in reduction.scene.pairs}
-    for (view, own), (name, found) in zip(
-        views(reduction, solution), pair_resultants(reduction, solution).items()
-    ):
-        problem, r = view.problem, own.reactions
-        status, zone = contact_status(problem, r), contact_zone(view.scene, problem, r)
-        level = is_level(problem, view.coupling.frames, r)
+    for number, (name, found) in enumerate(pair_resultants(reduction, solution).items()):
+        seen, own = pair_view(reduction, solution, number)
+        problem, r = seen.problem, own.reactions
+        status, zone = contact_status(problem, r), contact_zone(seen.scene, problem, r)
+        level = is_level(problem, seen.coupling.frames, r)
         friction = float(lengths(r[:, 1:]).sum())
         pairs[name] = found.table | {
             "bodies": bodies[name],
@@ -170,12 +166,12 @@ def tables(reduction: Reduction, solution: Solution) -> dict[str, Any]:
             "friction_force": friction if friction > ROUNDED * lengths(r).sum() else 0.0,
             "friction_bound": float(problem.law.bound_along(r).sum()),
             "max_pressure": float(nodal_pressure(problem, own).max(initial=0.0)),
-            "contact_area": contact_area(view.scene, problem, r, zone[0]),
+            "contact_area": contact_area(seen.scene, problem, r, zone[0]),
             "contact_half_width": zone[0] if level else None,
-            "stick_half_width": stick_width(view, own, zone)[0] if level else None,
-            "coupling": view.coupling.kind,
-            "coupled_because": view.coupling.why,
-            "carrier": view.coupling.carrier,
+            "stick_half_width": stick_width(seen, own, zone)[0] if level else None,
+            "coupling": seen.coupling.kind,
+            "coupled_because": seen.coupling.why,
+            "carrier": seen.coupling.carrier,
             "contacts": problem.contacts,
             "open": int(status.open.sum()),
             "stick": int(status.stick.sum()),

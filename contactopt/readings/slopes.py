@@ -15,7 +15,7 @@ from contactopt.errors import InputError
 from contactopt.problem.laws.law import Law
 from contactopt.readings.edges import contact_edge, stick_edge, width_reading
 from contactopt.readings.peaks import pressure_reading
-from contactopt.readings.resultants import views
+from contactopt.readings.resultants import pair_view
 from contactopt.readings.state import Seeds, State
 from contactopt.scenes.parameters import Parameter
 
@@ -25,7 +25,7 @@ MOST = 3000  # contacts at which a reading is differentiated
 
 def of_pressure(state: State, pair: int) -> Seeds:
     """The largest pressure of one pair, with the derivatives of its reading."""
-    reduction, solution = views(state.reduction, state.solution)[pair]
+    reduction, solution = pair_view(state.reduction, state.solution, pair)
     reading, by_r = pressure_reading(reduction, solution), np.zeros(solution.reactions.shape)
     for peak in reading.peaks[:1]:
         np.add.at(by_r[:, 0], peak.sources, peak.slopes)
@@ -34,7 +34,7 @@ def of_pressure(state: State, pair: int) -> Seeds:
 
 def of_width(state: State, pair: int) -> Seeds:
     """The half-width of contact of one pair, which reads the normal forces at closed contacts."""
-    reduction, solution = views(state.reduction, state.solution)[pair]
+    reduction, solution = pair_view(state.reduction, state.solution, pair)
     r = solution.reactions
     by_r = np.zeros(r.shape)
 
@@ -50,7 +50,7 @@ def of_width(state: State, pair: int) -> Seeds:
 
 def of_stick(state: State, pair: int) -> Seeds:
     """Half-width of stick over contact, by forces, slip and bounds, while states stay the same."""
-    reduction, solution = views(state.reduction, state.solution)[pair]
+    reduction, solution = pair_view(state.reduction, state.solution, pair)
     scene, problem, r = reduction.scene, reduction.problem, solution.reactions
     u, d = problem.displacements(r, solution.multipliers), problem.dim
     sticks = problem.law.sticking(r)

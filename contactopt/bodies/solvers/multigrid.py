@@ -25,7 +25,15 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from contactopt.bodies.motions import rigid_fields
-from contactopt.bodies.solvers.constants import COARSEST, DEGREE, MOST_ITERATIONS, NEAR, RTOL, USUAL
+from contactopt.bodies.solvers.constants import (
+    COARSEST,
+    DEGREE,
+    MOST_ITERATIONS,
+    NEAR,
+    RTOL,
+    TELLING,
+    USUAL,
+)
 from contactopt.bodies.solvers.sparse_products import BlockProduct, SparseProduct, galerkin
 from contactopt.bodies.solvers.system import INDEFINITE, Act, BodySolver, Submatrix, System
 from contactopt.checks import check_number
@@ -66,7 +74,8 @@ class MultigridSolver(BodySolver):
         out = np.zeros(load.shape)
         for b, x in zip(load.reshape(self.n, -1).T, out.reshape(self.n, -1).T):
             x[:], cycles = conjugate_gradients(self.A, self.cycle, b, rtol)
-            expect(slower=cycles / (USUAL * -np.log10(rtol)))
+            if rtol <= TELLING:
+                expect(slower=cycles / (USUAL * -np.log10(rtol)))
         return out
 
 
