@@ -30,5 +30,6 @@ LARGE = 2**20
 SHARE = 4  # pieces of such a product for each core; whoever is free takes the next one
 GALERKIN = 8  # pieces of rows from which the matrix of the next level is summed up
 RTOL = 1e-10  # accuracy of an iterative solve when none is asked for
-TELLING = 1e-6  # accuracy of a solve whose V-cycles tell of others: its first digits take more
+TELLING = 1e-6  # accuracy from which the V-cycles of a solve say what others will take: the first
+# digits of a solve take more than later ones
 MOST_ITERATIONS = 300  # conjugate gradient iterations before a solve is given up

@@ -74,8 +74,8 @@ class Linearised:
         balance: np.ndarray,
         rtol: float,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """dr (k d,) and dlambda (p,) for the right sides error (k d,) and -balance, by GMRES whose
-        `inverse` may change, to `rtol` of them.
+        """dr (k d,) and dlambda (p,) for the right sides error (k d,) and -balance, by flexible
+        GMRES: what is left of the rows is at most rtol |(error, balance)|.
         """
         closed, V = self.closed, self.equations.V
         n, known = len(closed), error.copy()
@@ -83,7 +83,7 @@ class Linearised:
         right = np.concatenate([error[closed], -balance - V.T @ known])
         if np.any(known):
             right[:n] -= self.rows(known, product(known))[closed]
-        # what the open contacts do to the others may be many times the errors
+        # `right` also holds what open contacts do to the others, which may be many times the errors
         errors = np.hypot(np.linalg.norm(error), np.linalg.norm(balance))
         goal = rtol * min(1.0, errors / (np.linalg.norm(right) or 1.0))
         A = self.operator(product)
