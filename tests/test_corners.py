@@ -178,6 +178,43 @@ def test_the_least_friction_obeys_the_law(law, share):
     assert np.allclose(exchanged.least_friction(problem, given, 1e-8).reactions, exact, atol=1e-7)
 
 
+def meeting(angles, mu, force, rigid=False, named=True) -> InterfaceProblem:
+    """A node under a force in several contacts, whose normals have these angles with x."""
+    frames = [[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in angles]
+    B, k = np.concatenate(frames), len(angles)
+    chart = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3).chart
+    pairs = [Pair(str(i), i, i + 1, chart) for i in range(k)]
+    given = {"pairs": tuple(pairs), "coordinates": np.zeros((2, k))} if named else {}
+    if rigid:
+        return InterfaceProblem(0 * B @ B.T, np.zeros((k, 2)), mu, V=B, s=-np.array(force), **given)
+    return InterfaceProblem(B @ B.T, -(B @ force).reshape(k, 2), mu, **given)
+
+
+@pytest.mark.parametrize(
+    ("angles", "mu", "force", "several"),
+    [
+        ((0, 0), (0.2, 1.0), (1.4, 0.5), False),  # both slip, each along its own ray
+        ((np.pi / 2, -np.pi / 2), (0.5, 0.5), (0.1, 0.05), False),  # slips on one wall of two
+        ((0, 0), (0.5, 0.5), (1.4, 0.8), True),  # both slip along one ray
+        ((0, 0), (0.5, 0.5), (1.4, 0.7), True),  # between stick and slip
+        ((0, 0), (0.5, 0.5), (1.4, 0.2), True),
+    ],
+)
+def test_forces_that_the_law_forbids_to_exchange_are_unique(angles, mu, force, several):
+    for named in (True, False):
+        answer = solve(meeting(angles, mu, force, named=named))
+        assert answer.solved and ("not unique" in "".join(answer.notes)) == several
+    if several and force[1] <= 0.7:
+        assert "not unique" in "".join(solve(meeting(angles, mu, force, rigid=True)).notes)
+
+
+def test_contacts_at_one_place_that_lack_room_within_the_law_are_solved():
+    """The weights of even pressures and of the law are so far apart that rounding decided."""
+    force = [-0.3957788211685796, 1.1467833935816263]
+    answer = solve(meeting((np.pi / 4, -np.pi / 2, np.pi / 2), 0.5, force))
+    assert answer.solved and answer.residual < 1e-10
+
+
 def test_a_seat_whose_forces_have_the_least_friction_is_not_said_to_be_far_off():
     """Its 27 contacts exchange forces, so that rounding makes the condition of the solution."""
     assert not solve(reduce(cubic(2, 1))).notes

@@ -31,6 +31,9 @@ FEW = 600
 INSIDE = 1e-6
 SEEN = 1e-6  # size of the friction of an exchange of size one that has some
 EMPTY = np.zeros(0, dtype=int)
+# residual of other forces over the square of their distance: that of forces outside of a cone is
+# near one, that of allowed ones was at most 1e-7
+OUTSIDE = 1e-4
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 # by forces that are hardly felt, and the certificate up to which others may take their place
 HARDLY_FELT, CLEAR = (1e-6, 1e-8), 1e-10
@@ -103,11 +106,7 @@ def _exchanged(
     problem: InterfaceProblem, solution: Solution, tol: float, near: np.ndarray, at: np.ndarray
 ) -> tuple[Solution, np.ndarray]:
     """The solution with the least friction that contacts exchange; where some or several stay."""
-    r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
-    fixed = problem.law.lowest < 0
-    felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())
-    pressed = r[:, 0] > INSIDE * np.abs(r[:, 0]).max()
-    contacts = near[(fixed | pressed | (u[:, 0] <= felt))[near]]
+    contacts = near[_touching(problem, solution)[near]]
     own, ways, sizes = exchanges(problem, contacts)
     unfelt = bool(np.any(sizes <= UNFELT))
     for least in (*HARDLY_FELT, UNFELT):
@@ -119,8 +118,44 @@ def _exchanged(
             if residual <= enough:
                 made = replace(solution, reactions=chosen, residual=residual)
                 left = _most_friction(made, at) if _rubs(chosen[at]) else uneven
-                return made, left if unfelt else EMPTY
+                several = len(left) and _several(problem, made, own, ways[:, sizes <= UNFELT])
+                return made, left if several else EMPTY
     return solution, _most_friction(solution, at if len(at) else contacts) if unfelt else EMPTY
+
+
+def _touching(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
+    """(k,) the contacts that are pressed or have no gap, and those that cannot open."""
+    r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
+    felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())
+    pressed = r[:, 0] > INSIDE * np.abs(r[:, 0]).max()
+    return np.asarray((problem.law.lowest < 0) | pressed | (u[:, 0] <= felt))
+
+
+def unique(problem: InterfaceProblem, solution: Solution) -> bool:
+    """Whether the law allows no exchange of forces that nothing feels."""
+    own, ways, sizes = exchanges(problem, np.flatnonzero(_touching(problem, solution)))
+    return not _several(problem, solution, own, ways[:, sizes <= UNFELT])
+
+
+def _several(
+    problem: InterfaceProblem, solution: Solution, own: np.ndarray, some: np.ndarray
+) -> bool:
+    """Whether the law allows other forces than these. They are the nearest allowed ones to a point
+    that lies off along an exchange by chance, and to the one opposite, only if no others are.
+    """
+    if not some.size:
+        return False
+    r, size = solution.reactions, np.abs(solution.reactions).max() or 1.0
+    off = np.zeros(r.size)
+    off[own] = some @ np.random.default_rng(0).normal(size=some.shape[1])
+    off *= size / (np.abs(off).max() or 1.0)
+    for sign in (1, -1):
+        wanted = r + sign * off.reshape(r.shape)
+        found = _within(problem, solution, own, some, wanted)[0]
+        moved = np.abs(found - r).max() / size
+        if natural_map_residual(problem, found, solution.multipliers) < OUTSIDE * moved**2:
+            return True
+    return False
 
 
 def exchanges(
@@ -187,11 +222,15 @@ def _weights(problem: InterfaceProblem) -> np.ndarray:
 
 
 def _within(
-    problem: InterfaceProblem, solution: Solution, own: np.ndarray, unfelt: np.ndarray
+    problem: InterfaceProblem,
+    solution: Solution,
+    own: np.ndarray,
+    unfelt: np.ndarray,
+    wanted: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same where the law bounds the choice, and no place: the least of a convex function over
-    the forces that obey the law with the displacements of the solution, by the method of
-    multipliers with Newton's steps.
+    """The same where the law bounds the choice, or the nearest to `wanted` forces (k, dim), and no
+    place: the least of a convex function over the forces that obey the law with the displacements
+    of the solution, by the method of multipliers with Newton's steps.
     """
     dim, size = problem.dim, np.abs(solution.reactions).max()
     contacts, place = np.unique(own // dim, return_inverse=True)
@@ -200,6 +239,9 @@ def _within(
     ways[place, own % dim] = unfelt
     ways = ways @ _allowed(problem, solution, contacts, ways)
     flat, weight = ways.reshape(given.size, -1), _weights(problem)[contacts].ravel()
+    aim = np.zeros(given.size)
+    if wanted is not None:
+        aim, weight = wanted[contacts].ravel(), np.ones(given.size)
     scaled = flat * weight[:, None]
     square = scaled.T @ scaled
     z, pull, stiff = np.zeros(flat.shape[1]), np.zeros_like(given), HARDER
@@ -209,13 +251,14 @@ def _within(
             r = given + ways @ z
             y = r + pull / stiff
             inside, slope = law.nearest_derivative(y, r[:, 0])
-            off, left = y - inside, weight * r.ravel()
+            off, left = y - inside, weight * (r.ravel() - aim)
             value = left @ left + stiff * np.vdot(off, off)
             if value < least * (1 - EPS):
                 least, kept = value, (z, stiff * off)
                 bent = (ways - slope @ ways).reshape(given.size, -1)
                 bent = square + stiff * flat.T @ bent
-                step = -np.linalg.solve(bent, scaled.T @ left + flat.T @ kept[1].ravel())
+                pulled = scaled.T @ left + flat.T @ kept[1].ravel()
+                step = -np.linalg.lstsq(bent, pulled, rcond=None)[0]
             elif np.abs(step).max(initial=0.0) <= EPS * size:
                 break
             else:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from contactopt.linear.operators import form
-from contactopt.problem import InterfaceProblem, Solution
+from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.certificate import amplification
 
 # a remark is due if a small problem has so large a condition, and its forces so large an error
@@ -100,10 +100,15 @@ def remark(
     # where contacts share a place, forces that are hardly felt have been exchanged
     if residual <= EXACT and (problem.shared_places or not problem.nearly_singular):
         return ""
+    from contactopt.methods.exchanged import unique  # it makes notes
+
     condition = amplification(problem, reactions, multipliers)
     error = condition * max(residual, np.finfo(float).eps)
     if condition <= WEDGED or error <= MUCH:
-        return ""
+        found = Solution(reactions, multipliers, Status.SOLVED, residual, 0, "")
+        if problem.shared_places or not problem.nearly_singular or unique(problem, found):
+            return ""
+        condition = np.inf  # contacts between two states may exchange forces in one of them
     why = f"by {min(error, 1.0):.0%} of the typical force, because the solution is"
     why += " nearly not unique"
     if not condition < LOOSE:
