@@ -81,8 +81,8 @@ def least_friction(problem: InterfaceProblem, solution: Solution, tol: float) ->
         solution, some = _exchanged(problem, solution, tol, near, at)
         left += [at[0]] * (len(some) > 0)
     said = "the contact forces are not unique: forces that the contacts there exchange change"
-    said += " nothing else; pressures and friction there are one choice of several, and may differ"
-    said += " in an equivalent scene"
+    said += " nothing else but slip; pressures and friction there are one choice of several, and"
+    said += " may differ in an equivalent scene"
     # in the plane a corner exchanges forces with contacts nearby alone
     unseen = not known or (problem.contacts > FEW and problem.dim == 3)
     if not left and unseen and places and _rubs(solution.reactions[corners]):
@@ -118,51 +118,51 @@ def _exchanged(
             if residual <= enough:
                 made = replace(solution, reactions=chosen, residual=residual)
                 left = _most_friction(made, at) if _rubs(chosen[at]) else uneven
-                several = len(left) and _several(problem, made, own, ways[:, sizes <= UNFELT])
-                return made, left if several else EMPTY
+                return made, left if unfelt else EMPTY
     return solution, _most_friction(solution, at if len(at) else contacts) if unfelt else EMPTY
 
 
 def _touching(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
     """(k,) the contacts that are pressed or have no gap, and those that cannot open."""
     r, u = solution.reactions, problem.displacements(solution.reactions, solution.multipliers)
-    felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())
     pressed = r[:, 0] > INSIDE * np.abs(r[:, 0]).max()
-    return np.asarray((problem.law.lowest < 0) | pressed | (u[:, 0] <= felt))
+    return np.asarray((problem.law.lowest < 0) | pressed | (u[:, 0] <= _felt(problem, u)))
 
 
 def unique(problem: InterfaceProblem, solution: Solution) -> bool:
-    """Whether the law allows no exchange of forces that nothing feels."""
-    own, ways, sizes = exchanges(problem, np.flatnonzero(_touching(problem, solution)))
-    return not _several(problem, solution, own, ways[:, sizes <= UNFELT])
-
-
-def _several(
-    problem: InterfaceProblem, solution: Solution, own: np.ndarray, some: np.ndarray
-) -> bool:
-    """Whether the law allows other forces than these. They are the nearest allowed ones to a point
-    that lies off along an exchange by chance, and to the one opposite, only if no others are.
+    """Whether the law allows no other forces of contacts that touch; where they slip, these may
+    change the slip. Forces are the nearest allowed ones to a point that lies off along an exchange
+    by chance, and to the one opposite, only if no others are.
     """
+    contacts = np.flatnonzero(_touching(problem, solution))
+    u = problem.displacements(solution.reactions, solution.multipliers)
+    slipping = np.zeros(u.shape, dtype=bool)
+    slipping[:, 1:] = (np.linalg.norm(u[:, 1:], axis=1) > _felt(problem, u))[:, None]
+    own, ways, sizes = exchanges(problem, contacts, ~slipping.ravel())
+    some, r = ways[:, sizes <= UNFELT], solution.reactions
     if not some.size:
-        return False
-    r, size = solution.reactions, np.abs(solution.reactions).max() or 1.0
-    off = np.zeros(r.size)
+        return True
+    off, size = np.zeros(r.size), np.abs(r).max() or 1.0
     off[own] = some @ np.random.default_rng(0).normal(size=some.shape[1])
-    off *= size / (np.abs(off).max() or 1.0)
-    for sign in (1, -1):
-        wanted = r + sign * off.reshape(r.shape)
-        found = _within(problem, solution, own, some, wanted)[0]
+    off *= size / np.abs(off).max()
+    for share in (1.0, -1.0, 1e-3, -1e-3):  # with much more force a contact may slip the other way
+        found = _within(problem, solution, own, some, r + share * off.reshape(r.shape))[0]
         moved = np.abs(found - r).max() / size
         if natural_map_residual(problem, found, solution.multipliers) < OUTSIDE * moved**2:
-            return True
-    return False
+            return False
+    return True
+
+
+def _felt(problem: InterfaceProblem, u: np.ndarray) -> float:
+    """Displacements (k, dim) beside which smaller ones count as none [length]."""
+    return INSIDE * float(max(np.abs(u).max(), np.abs(u - problem.q).max()))
 
 
 def exchanges(
-    problem: InterfaceProblem, contacts: np.ndarray
+    problem: InterfaceProblem, contacts: np.ndarray, rows: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unknowns (m,) of some contacts' forces, a basis (m, j) of changes y that the bodies hardly
-    feel, and the relative sizes (j,) of Q y and V' y.
+    feel, and the relative sizes (j,) of Q y, or of some of its rows (k dim,), and V' y.
     """
     Q, dim = problem.Q, problem.dim
     free = np.zeros((problem.contacts, dim), dtype=bool)
@@ -173,8 +173,8 @@ def exchanges(
     columns = Q[:, own] if form(Q) == "array" else Q[:, own].toarray()
     motions = problem.V[own] / np.where(problem.reach > 0, problem.reach, 1.0)
     scaled = columns / (np.abs(columns).max() or 1.0)
-    felt = np.vstack([scaled, motions.T])
-    if not problem.symmetric:
+    felt = np.vstack([scaled if rows is None else scaled[rows], motions.T])
+    if not problem.symmetric or rows is not None:
         return own, *_shortened(felt, HARDLY_FELT[0])
     # y'Q y <= HARDLY_FELT and |V'y|^2 <= HARDLY_FELT hold on a space that contains the y looked for
     # and is found sooner, since the matrix is semidefinite
@@ -280,7 +280,7 @@ def _allowed(
     and are zero at open ones.
     """
     u = problem.displacements(solution.reactions, solution.multipliers)
-    felt = INSIDE * max(np.abs(u).max(), np.abs(u - problem.q).max())
+    felt = _felt(problem, u)
     u = u[contacts]
     u[np.abs(u[:, 0]) <= felt, 0] = 0.0
     u[np.linalg.norm(u[:, 1:], axis=1) <= felt, 1:] = 0.0
