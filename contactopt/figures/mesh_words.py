@@ -10,7 +10,7 @@ from skfem import Mesh
 
 from contactopt.bodies.elements import Faces
 from contactopt.cards import count
-from contactopt.checks import RINGS, remembered
+from contactopt.checks import remembered
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
 UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
@@ -24,7 +24,7 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
     named = {re.sub(r"[^\w-]", "-", group or path.stem): mesh for group, mesh in meshes.items()}
     solid = any(len(mesh.p) == 3 for mesh in meshes.values())
     inside, side = ("volume", "area") if solid else ("area", "length")
-    rings = any(text.endswith(RINGS) for mesh in meshes.values() for text in remembered(mesh))
+    rings = any("axisymmetric" in remembered(mesh).values() for mesh in meshes.values())
     kind = "solid" if solid else "axisymmetric" if rings else "plane-strain"
     lines = [f'kind = "{kind}"', UNITS]
     for (name, mesh), group in zip(named.items(), meshes):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.cards import count
-from contactopt.checks import RINGS, remembered
+from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
 from contactopt.scenes.material_library import STRESSES
@@ -93,8 +93,8 @@ def _pointed(part: Part, bears: Callable[[str], bool]) -> list[str]:
 def said_of_meshes(scene: Scene) -> list[str]:
     """What was said of the meshes of a scene when their files were read."""
     given = [part.mesh for part in scene.meshed.values() if part.given]
-    said = [text for mesh in given for text in remembered(mesh)]
-    return [text for text in said if scene.kind != "axisymmetric" or not text.endswith(RINGS)]
+    said = (own for mesh in given for own in remembered(mesh).items())
+    return [text for text, kind in said if kind != scene.kind]
 
 
 def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
