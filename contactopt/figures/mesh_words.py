@@ -30,13 +30,9 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
     for (name, mesh), group in zip(named.items(), meshes):
         size = np.abs(mesh.p).max()
         low, high = _place(mesh.p.min(axis=1), size), _place(mesh.p.max(axis=1), size)
-        lines.append(
-            f"\n[bodies.{name}]  # {count(mesh.nelements, 'element')},"
-            f" {inside} {_measure(mesh)[0]:.5g}"
-        )
-        lines += [f"# from {low} to {high}", f'mesh = "{path}"']
-        lines += [] if group is None else [f'group = "{group}"']
-        lines.append('material = "steel"')
+        said = f"{count(mesh.nelements, 'element')}, {inside} {_measure(mesh)[0]:.5g}"
+        lines += [f"\n[bodies.{name}]  # {said}", f"# from {low} to {high}", f'mesh = "{path}"']
+        lines += [*([] if group is None else [f'group = "{group}"']), 'material = "steel"']
         for boundary, facets in (mesh.boundaries or {}).items():
             area, middle = _measure(mesh, np.asarray(facets))
             lines.append(

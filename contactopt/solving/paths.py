@@ -220,13 +220,13 @@ class PathResult:
 def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
     r, edges = state.solution.reactions, (np.nan, np.nan)
     status = contact_status(problem, r)
-    pairs, along = problem.pairs, np.broadcast_to(np.eye(problem.dim)[1], r.shape)
-    names = [""] if len(pairs) == 1 else [f":{pair.name}" for pair in pairs]
+    along, single = np.broadcast_to(np.eye(problem.dim)[1], r.shape), len(problem.pairs) == 1
     forces = {}
-    for name, own in zip(names, (pair.contacts for pair in pairs)):
+    for pair in problem.pairs:
+        own, name = pair.contacts, "" if single else f":{pair.name}"
         forces[f"normal_force{name}"] = float(r[own, 0].sum())
         forces[f"shear_force{name}"] = 0.0 - total(along[own], r[own])
-    if len(pairs) == 1:
+    if single:
         stick = stick_edge(state.scene, problem, r, state.slip)[0]
         edges = contact_edge(state.scene, problem, r), stick
     return {
