@@ -104,7 +104,7 @@ def remark(
     error = condition * max(residual, np.finfo(float).eps)
     if condition <= WEDGED or error <= MUCH:
         return ""
-    why = f"by {min(error, 1.0):.0%} of the typical force, because the solution is"
+    why = f"by {100 * min(error, 1.0):.3g} % of the typical force, because the solution is"
     why += " nearly not unique"
     if not condition < LOOSE:
         if problem.shared_places:
