@@ -44,7 +44,7 @@ def tube(low, high, chords):
 
 
 def test_a_tie_between_two_planes_that_hold_both_bodies_asks_nothing_of_what_they_hold():
-    """The mesh leans the normals at the ends; along them the tie would ask what nothing can move."""
+    """The mesh leans normals at the ends; along them the tie would ask what nothing can move."""
     held = tuple(Support(f"{name}", {name[0]: 0.0}) for name in ("x-", "y-", "z-", "z+"))
     parts = [
         Part("inner", tube(0.5, 1.001, 9), Material(100.0, 0.3), held, contact="out"),
