@@ -218,19 +218,18 @@ def overheard() -> Iterator[list[str]]:
         logger.removeHandler(handler)
 
 
-RINGS = "are axisymmetric, and the scene is not"  # the end of a remark on a mesh
-_TOLD: dict[int, tuple[str, ...]] = {}  # by the array of its nodes: copies of a mesh share it
+_TOLD: dict[int, dict[str, str]] = {}  # by the array of its nodes: copies of a mesh share it
 
 
-def remember(mesh: Mesh, told: Iterable[str]) -> Any:
-    """The mesh, whose remarks, made when it was read, are those of every run with it."""
-    if told := tuple(told):
+def remember(mesh: Mesh, told: dict[str, str]) -> Any:
+    """The mesh, with remarks for every run with it, but for scenes of the kind that each names."""
+    if told:
         if id(mesh.doflocs) not in _TOLD:
             weakref.finalize(mesh.doflocs, _TOLD.pop, id(mesh.doflocs), None)
         _TOLD[id(mesh.doflocs)] = told
     return mesh
 
 
-def remembered(mesh: Mesh) -> tuple[str, ...]:
-    """What was said of a mesh when it was read."""
-    return _TOLD.get(id(getattr(mesh, "doflocs", None)), ())
+def remembered(mesh: Mesh) -> dict[str, str]:
+    """What was said of a mesh when it was read, with the kind of scenes that it is not for."""
+    return _TOLD.get(id(getattr(mesh, "doflocs", None)), {})

@@ -306,7 +306,7 @@ def _result(
     summary["remarks"] = list(dict.fromkeys(every))
     if path is not None:
         single = len(reduction.problem.pairs) == 1
-        keys = [key for key in PATH_KEYS if single or not key.endswith("half_width")]
+        keys = [key for key in PATH_KEYS if single or not key.endswith(("half_width", "_force"))]
         summary["states"], summary["shown"] = len(path.states), path.shown
         summary |= {key: float(path.history[key][-1]) for key in keys}
     if estimate is not None:

@@ -20,6 +20,7 @@ from contactopt import (
     Scene,
     Support,
     Traction,
+    follow,
     natural_map_residual,
     reduce_bodies,
     run,
@@ -27,6 +28,7 @@ from contactopt import (
     transfer,
 )
 from contactopt.problem import alone
+from contactopt.readings.quantities import find_quantity
 from contactopt.readings.resultants import holder_resultants, pair_resultants, tables
 
 SOFT = Material(1000.0, 0.3)
@@ -237,6 +239,21 @@ def test_tables_of_one_pair_are_those_of_the_whole():
     for name in ("normal_force", "max_pressure", "contact_half_width", "stick_half_width"):
         assert pair[name] == pytest.approx(result.summary[name])
     assert pair["force"][1] == pytest.approx(100.0)
+
+
+def test_of_two_equal_pairs_each_has_its_normal_force():
+    """Their sum is twice the load, which is the force on no body."""
+    scene = stack(2, 2, side=0.0, width=2.0, cells=(4,))
+    one, history = run(scene, figures=()), follow([scene]).history
+    pairs = one.summary["pairs"]
+    load = [pytest.approx(pair["force"][1]) for pair in pairs.values()]
+    assert len(pairs) == 2 and one.summary["normal_force"] is None
+    assert [pair["normal_force"] for pair in pairs.values()] == load
+    name = next(iter(pairs))
+    with pytest.raises(InputError, match=f"name the pair, as in 'shear_force:{name}'"):
+        find_quantity("shear_force", scene)
+    assert not {"normal_force", "shear_force"} & history.keys()
+    assert [history[f"normal_force:{name}"][-1] for name in pairs] == load
 
 
 @pytest.mark.parametrize("change,message", [

@@ -71,6 +71,25 @@ def test_forces_that_are_not_unique_have_no_condition():
     assert amplification(loose, r, np.zeros(2)) < 10
 
 
+@pytest.mark.parametrize("angle", [0.0, 1e-6, 0.7])
+def test_tangents_at_rest_leave_the_other_forces_unique(angle):
+    """A support holds a direction between the tangents; without one forces of two contacts remain
+    that nothing tells apart.
+    """
+    turn = np.eye(6)
+    turn[1:3, 1:3] = [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+    Q = np.diag([1.0, 0.0, 2.0, 1.0, 2.0, 2.0])
+    Q[[0, 3], [3, 0]] = 0.5
+    q = np.array([[-1.0, 0.0, 0.3], [-1.0, 0.2, 0.1]]).ravel()
+    problem = InterfaceProblem(turn @ Q @ turn.T, (turn @ q).reshape(2, 3), 0.5)
+    answer = solve(problem, tol=1e-12)
+    assert amplification(problem, answer.reactions, answer.multipliers) < 10
+    assert not any("not unique" in said for said in answer.notes)
+    twice = InterfaceProblem(np.kron(np.ones((2, 2)), Q[:3, :3]), np.stack([q[:3]] * 2), 0.5)
+    r = np.array([[0.5, 0.0, -0.1], [0.5, 0.0, -0.1]])
+    assert amplification(twice, r, np.zeros(0)) > 1e12
+
+
 def any_problem(seed: int) -> InterfaceProblem:
     """1 to 3 contacts in the plane or in space; Q definite, unsymmetric or semidefinite."""
     rng = np.random.default_rng(seed)

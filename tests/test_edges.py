@@ -262,6 +262,23 @@ def test_the_edge_of_a_flat_punch_is_that_of_the_surface():
     falling = r.copy()
     falling[np.argsort(problem.coordinates[0])[-1]] *= 1e-3
     assert contact_zone(scene, problem, falling)[1] > 0.1
+    wall = np.stack([1e-14 * np.cos(np.arange(len(r)) ** 2), problem.coordinates[0]])
+    upright = replace(problem, coordinates=wall)
+    assert contact_zone(scene, upright, r) == (pytest.approx(20.0), 0.0)
+
+
+def test_a_zone_on_two_feet_does_not_lie_between_them():
+    """One foot touches all over, and the next one up to a corner's pressure that ends at 9.3."""
+    x = np.concatenate([np.linspace(0, 1, 11), np.linspace(8, 10, 21)])
+    areas = np.full(32, 0.1)
+    areas[[0, 10, 11, 31]] = 0.05
+    scene, problem = contact(x[None], "plane-strain", areas)
+    links = np.stack([np.arange(31), np.arange(1, 32)])
+    cells = np.delete(links, 10, axis=1)
+    problem = replace(problem, chart=replace(problem.chart, cells=cells))
+    p = np.where(x < 2, 1.0, np.sqrt(np.maximum(0.0, 1 - ((x - 8) / 1.3) ** 2)))
+    r = np.stack([areas * p, 0 * p], axis=1)
+    assert contact_edge(scene, problem, r) == pytest.approx((1 + 1.3) / 2, abs=0.025)
 
 
 SPREAD = """kind = "solid"

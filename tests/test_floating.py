@@ -26,7 +26,8 @@ from contactopt import (
 )
 from contactopt.bodies import assemble, views
 from contactopt.bodies import elastic as elastic_bodies
-from contactopt.problem.unbalanced_loads import escape, sentence
+from contactopt.problem import InterfaceProblem
+from contactopt.problem.unbalanced_loads import _names, escape, sentence
 from contactopt.readings.quantities import elastic_energy
 from contactopt.readings.resultants import pair_resultants
 
@@ -326,3 +327,12 @@ def test_a_rigid_normal_on_the_wrong_side_is_refused():
     ):
         with pytest.raises(InputError, match="points away from body 'b'"):
             reduce_bodies(alone(part, floor))
+
+
+def test_loose_motions_are_named_in_the_order_of_the_problem():
+    """Whichever is found first: the third is the largest here."""
+    labels = tuple(f"body 'a': translation along {axis}" for axis in "xyz")
+    none = np.zeros((1, 3))
+    problem = InterfaceProblem(np.eye(3), none, [0.0], V=np.eye(3), s=none[0], motions=labels)
+    loose = np.array([[0.6, 0.0], [0.8, 0.0], [0.0, 1.0]])
+    assert _names(problem, loose) == ", ".join(labels[1:])

@@ -81,7 +81,7 @@ def test_misplaced_bodies_are_told():
     apart = check_scene((two((Plate("y+", {"y": -1.0}),), gap=0.5),))
     assert "0.5 length or more apart" in apart.notes[0]
     over = check_scene((two((Plate("y+", {"y": -1.0}),), gap=-0.25),))
-    assert "overlap by up to 0.25" in over.notes[0] and "5 overlap, 100% of the area" in over.text
+    assert "overlap by up to 0.25" in over.notes[0] and "5 overlap, 100 % of the area" in over.text
 
 
 def test_the_way_and_its_memory_are_those_of_the_run(caplog):

@@ -108,6 +108,17 @@ def test_numbers_and_their_words_agree():
     assert not found
 
 
+def test_no_share_of_less_than_one_percent_is_printed_as_none():
+    """Only constants, which are round, are printed as whole percents."""
+    found = [
+        f"{path.name}: {value}"
+        for path in Path(contactopt.__file__).parent.rglob("*.py")
+        for value in re.findall(r"\{([^{}]*):\.0%\}", path.read_text())
+        if not value.isupper()
+    ]
+    assert not found
+
+
 def test_a_path_says_how_many_states_there_are():
     said = []
     path = follow(scenes.growing_indentation(steps=2, elements=6), note=said.append)

@@ -243,7 +243,7 @@ def accuracy_lines(scene: Scene, made: Posed, accuracy: float = 0.01) -> list[st
     given = any(isinstance(part, HalfSpace) for part in scene.parts)
     here = f"here {scene.elements}" if given or found.degree else "here there are meshes"
     return [
-        f"for {accuracy:.0%} of the {what}: {way}, {across} of contact ({here}), tolerance"
+        f"for {100 * accuracy:.3g} % of the {what}: {way}, {across} of contact ({here}), tolerance"
         f" {found.tolerance:.0e}, about {found.seconds:.1g} s"
     ]
 

@@ -152,9 +152,9 @@ def tested(made: Coupling, pair: Contact, bodies: tuple[AssembledBody, Assembled
     instead = "coupling = 'mortar'" if made.kind == "matching" else "nodes that match"
     said = (
         f"contact '{pair.name}', coupled by {made.kind}: a constant pressure gives body"
-        f" '{bodies[found.side].name}' wrong forces near ({where}), by {found.error:.0%} at a node;"
-        f" pressures and stresses around it may be wrong by as much: take {instead} there, or"
-        " refine the meshes."
+        f" '{bodies[found.side].name}' wrong forces near ({where}), by {100 * found.error:.3g} %"
+        " at a node; pressures and stresses around it may be wrong by as much: take"
+        f" {instead} there, or refine the meshes."
     )
     return replace(made, fails=said)
 

@@ -12,7 +12,7 @@ from contactopt.coupling.charts import lay_out
 from contactopt.coupling.coupling import Coupling, guided, local_map, of_contacts
 from contactopt.coupling.faces import Faces, faces_of
 from contactopt.coupling.mortar import Mortar, contact_normals, mortar
-from contactopt.coupling.planes_of_symmetry import ContactPoints, symmetry_planes
+from contactopt.coupling.planes_of_symmetry import ContactPoints, end_planes
 from contactopt.defaults import EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.curves import KINK
@@ -195,7 +195,7 @@ def _faces(name: str, m: Mesh) -> Faces:
 
 def _halved(sides: list[Faces], meshes: list[Mesh]) -> list[Faces]:
     """Both surfaces with the nodes that lie in a plane of symmetry of both."""
-    planes = [symmetry_planes(_vertices(side, mesh)) for side, mesh in zip(sides, meshes)]
+    planes = [end_planes(_vertices(side, mesh)) for side, mesh in zip(sides, meshes)]
     size = max(float(np.ptp(side.points[:, np.unique(side.faces)], axis=1).max()) for side in sides)
     common = [
         plane

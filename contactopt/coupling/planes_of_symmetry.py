@@ -51,16 +51,24 @@ class SymmetryPlane:
 
 
 def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
-    """The planes, at most one per component, at an end of the surface, where this component is held
-    and the normal one is not, and which the surface crosses smoothly: a slanted one has an edge
-    there, and each side its own normal. A plate or a clamp may hold the surface elsewhere, too.
+    """The planes at an end of the surface, at most one per component: between two there would be
+    copies without end.
+    """
+    planes = end_planes(contacts)
+    across = [int(np.argmax(np.abs(plane.inward))) for plane in planes]
+    return [plane for plane, own in zip(planes, across) if across.count(own) == 1]
+
+
+def end_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
+    """The planes at both ends of the surface, per component, where this component is held and the
+    normal one is not, and which the surface crosses smoothly: a slanted one has an edge there, and
+    each side its own normal. A plate or a clamp may hold the surface elsewhere, too.
     """
     planes, (points, normals, held) = [], (contacts.points, contacts.normals, contacts.held)
     if not held.any():
         return []
     tilts = smooth_tilts(normals, contacts.cells)
     for c, mask in enumerate(held):
-        found = []
         for side in (1.0, -1.0) if mask.any() else ():
             offset = float((side * points[c]).min())
             plane = side * points[c] - offset <= EQUAL * contacts.size
@@ -68,15 +76,14 @@ def symmetry_planes(contacts: ContactPoints) -> list[SymmetryPlane]:
             # along the normal, at least, but for ends that are clamped
             moves = np.any(~held[:, plane] & (np.abs(normals[:, plane]) > EQUAL), axis=0)
             if np.all(mask[plane]) and not np.all(plane) and tangential and np.mean(moves) > 0.5:
-                found.append(SymmetryPlane(side * np.eye(len(points))[c], offset))
-        planes += found if len(found) == 1 else []
+                planes.append(SymmetryPlane(side * np.eye(len(points))[c], offset))
     return planes
 
 
 def normals_in_planes(contacts: ContactPoints) -> np.ndarray:
     """Unit normals (dim, k) that lie in the planes at their contacts, as with mirror images."""
     normals = contacts.normals
-    for plane in symmetry_planes(contacts):
+    for plane in end_planes(contacts):
         out = plane.inward @ normals
         straight = normals - plane.inward[:, None] * out
         straight = straight / np.linalg.norm(straight, axis=0).clip(EQUAL)

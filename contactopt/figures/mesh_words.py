@@ -10,7 +10,7 @@ from skfem import Mesh
 
 from contactopt.bodies.elements import Faces
 from contactopt.cards import count
-from contactopt.checks import RINGS, remembered
+from contactopt.checks import remembered
 from contactopt.scenes.facing_boundaries import as_toml, facing_boundaries, usual_distance
 
 UNITS = 'units = { length = "mm", stress = "MPa" }  # change it if the mesh has another'
@@ -24,19 +24,15 @@ def mesh_words(path: Path, meshes: Mapping[str | None, Any]) -> tuple[str, dict[
     named = {re.sub(r"[^\w-]", "-", group or path.stem): mesh for group, mesh in meshes.items()}
     solid = any(len(mesh.p) == 3 for mesh in meshes.values())
     inside, side = ("volume", "area") if solid else ("area", "length")
-    rings = any(text.endswith(RINGS) for mesh in meshes.values() for text in remembered(mesh))
+    rings = any("axisymmetric" in remembered(mesh).values() for mesh in meshes.values())
     kind = "solid" if solid else "axisymmetric" if rings else "plane-strain"
     lines = [f'kind = "{kind}"', UNITS]
     for (name, mesh), group in zip(named.items(), meshes):
         size = np.abs(mesh.p).max()
         low, high = _place(mesh.p.min(axis=1), size), _place(mesh.p.max(axis=1), size)
-        lines.append(
-            f"\n[bodies.{name}]  # {count(mesh.nelements, 'element')},"
-            f" {inside} {_measure(mesh)[0]:.5g}"
-        )
-        lines += [f"# from {low} to {high}", f'mesh = "{path}"']
-        lines += [] if group is None else [f'group = "{group}"']
-        lines.append('material = "steel"')
+        said = f"{count(mesh.nelements, 'element')}, {inside} {_measure(mesh)[0]:.5g}"
+        lines += [f"\n[bodies.{name}]  # {said}", f"# from {low} to {high}", f'mesh = "{path}"']
+        lines += [*([] if group is None else [f'group = "{group}"']), 'material = "steel"']
         for boundary, facets in (mesh.boundaries or {}).items():
             area, middle = _measure(mesh, np.asarray(facets))
             lines.append(

@@ -314,7 +314,8 @@ def _column(name: str, summary: dict[str, Any]) -> str:
     length, force = summary["units"][0], force_unit(summary["units"])
     units = {"seconds": "s"} | {f"{side}_force": force for side in ("normal", "shear")}
     units |= dict.fromkeys(("approach", "shift", "contact_half_width", "stick_half_width"), length)
-    unit = f"{force} {length}" if name.endswith(("energy", "work")) else units.get(name, "")
+    unit = units.get(name.partition(":")[0], "")
+    unit = f"{force} {length}" if name.endswith(("energy", "work")) else unit
     return name.replace("_", " ") + (f" [{unit}]" if unit and "[" not in name else "")
 
 

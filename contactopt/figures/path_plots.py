@@ -66,8 +66,9 @@ def _loop(path: PathResult) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
     history, (force, length) = path.history, _units(path)
     sheared = np.ptp(history["shift"]) > 1e-6 * np.ptp(history["approach"])
     keys = ("shift", "shear_force") if sheared else ("approach", "normal_force")
-    labels = f"{keys[0]} [{length}]", f"{keys[1].replace('_', ' ')} [{force}]"
-    return history[keys[0]], history[keys[1]], labels
+    own = next(name for name in history if name.startswith(keys[1]))  # of several pairs the first
+    labels = f"{keys[0]} [{length}]", f"{own.replace('_', ' ')} [{force}]"
+    return history[keys[0]], history[own], labels
 
 
 def _units(path: PathResult) -> tuple[str, str]:

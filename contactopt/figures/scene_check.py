@@ -184,7 +184,7 @@ def _pair_lines(scene: Scene, pair: Contact, own: Coupling) -> list[str]:
     words += [f"{touch.sum()} touch"] if touch.any() else []
     if overlap.any():
         share = float(own.areas[overlap].sum()) / total
-        words.append(f"{overlap.sum()} overlap, {share:.0%} of the area")
+        words.append(f"{overlap.sum()} overlap, {100 * share:.3g} % of the area")
     return [*lines, f"  {', '.join(words)}"]
 
 

@@ -78,7 +78,9 @@ class _Skin:
     """
 
     def __init__(self, mesh: Mesh) -> None:
-        self.nodes, self.owner, middles = _triangles(mesh)
+        facets = mesh.boundary_facets()
+        self.nodes, middles = edge_middles(mesh, facets)
+        self.owner = np.resize(facets, self.nodes.shape[1])
         self.corners = mesh.p[:, self.nodes]
         self.middles = middles
         self.off = middles - _between(self.corners)
@@ -170,26 +172,29 @@ def _along(corners: np.ndarray) -> np.ndarray:
     return np.asarray(np.roll(corners, -1, axis=1) - corners)
 
 
-def _triangles(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Corners (3, t) of the triangles, their facets (t,), and middles (3, 3, t) of their edges."""
-    facets = mesh.boundary_facets()
-    nodes = outer_corners(mesh, facets)
-    quads = len(nodes) == 4
-    tri = in_triangles(nodes)
-    ends = sides_of(tri)
+def edge_middles(mesh: Mesh, facets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (v, f) of facets, quadrilaterals cut in two, and the middles (dim, 1 or 3, f) of
+    their edges 01, 12, 20.
+    """
+    corners = outer_corners(mesh, facets)
+    nodes = in_triangles(corners)
+    ends = sides_of(nodes) if len(nodes) == 3 else nodes[:, None]
     middles = mesh.p[:, ends].mean(axis=1)
-    if is_curved(mesh):
-        size = mesh.nvertices
-        both = mesh.edges.astype(np.int64), ends
-        keys, wanted = (np.minimum(*each) * size + np.maximum(*each) for each in both)
-        order = np.argsort(keys)
-        place = order[np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)]
-        there = keys[place] == wanted  # diagonals of quadrilaterals are no edges
-        middles[:, there] = mesh.doflocs[:, mesh.dofs.edge_dofs[0, place[there]]]
-        if quads:
-            centres = mesh.doflocs[:, mesh.dofs.facet_dofs[0, facets]]
-            middles[:, 2, : len(facets)] = middles[:, 0, len(facets) :] = centres
-    return tri, np.tile(facets, 2) if quads else facets, middles
+    if not is_curved(mesh):
+        return nodes, middles
+    if len(nodes) == 2:
+        return nodes, mesh.doflocs[:, None, mesh.dofs.facet_dofs[0, facets]]
+    size = mesh.nvertices
+    both = mesh.edges.astype(np.int64), ends
+    keys, wanted = (np.minimum(*each) * size + np.maximum(*each) for each in both)
+    order = np.argsort(keys)
+    place = order[np.searchsorted(keys[order], wanted).clip(max=len(keys) - 1)]
+    there = keys[place] == wanted  # diagonals of quadrilaterals are no edges
+    middles[:, there] = mesh.doflocs[:, mesh.dofs.edge_dofs[0, place[there]]]
+    if len(corners) == 4:
+        centres = mesh.doflocs[:, mesh.dofs.facet_dofs[0, facets]]
+        middles[:, 2, : len(facets)] = middles[:, 0, len(facets) :] = centres
+    return nodes, middles
 
 
 def _neighbours(nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

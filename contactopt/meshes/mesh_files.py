@@ -14,7 +14,7 @@ import numpy as np
 import skfem
 
 from contactopt.cards import count
-from contactopt.checks import LARGEST, RINGS, check_number, overheard, place_words, remember
+from contactopt.checks import LARGEST, check_number, overheard, place_words, remember
 from contactopt.defaults import CLOSE, EQUAL
 from contactopt.errors import InputError
 from contactopt.meshes.cells import facets_at
@@ -57,7 +57,8 @@ def load_mesh(path: str | Path, group: str | None = None, scale: float = 1.0) ->
     with overheard() as told:
         groups = read_groups(Path(path))
         _tell_others(Path(path), groups)
-        return remember(_body(Path(path), groups, group, scale), told + _rings(Path(path), groups))
+        mesh = _body(Path(path), groups, group, scale)
+    return remember(mesh, dict.fromkeys(told, "") | _rings(Path(path), groups))
 
 
 def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
@@ -87,10 +88,11 @@ def load_bodies(path: Path) -> tuple[dict[str | None, skfem.Mesh], list[str]]:
     return {group: found[group] for group in names if group in found}, refused
 
 
-def _rings(path: Path, groups: FileGroups) -> list[str]:
+def _rings(path: Path, groups: FileGroups) -> dict[str, str]:
     """A remark for scenes that are not axisymmetric where the elements of the file are."""
     own = [word for word in groups.words.values() if word.startswith(("CAX", "CGAX", "DCAX"))]
-    return [f"{path}: elements of type {own[0]} {RINGS}"] if own else []
+    said = "are axisymmetric, and the scene is not"
+    return {f"{path}: elements of type {word} {said}": "axisymmetric" for word in own[:1]}
 
 
 def _numbers(members: Mapping[int, np.ndarray]) -> np.ndarray:

@@ -16,6 +16,7 @@ import numpy as np
 from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.certificate import amplification
+from contactopt.problem.scaling import along_rest
 
 # a remark is due if a small problem has so large a condition, and its forces so large an error
 FEW, WEDGED, MUCH = 50, 1e4, 1e-3
@@ -97,6 +98,7 @@ def remark(
     problem: InterfaceProblem, reactions: np.ndarray, multipliers: np.ndarray, residual: float
 ) -> str:
     """Where certified forces may be far off; "" if they are not."""
+    problem, reactions = along_rest(problem, reactions)
     # where contacts share a place, forces that are hardly felt have been exchanged
     if residual <= EXACT and (problem.shared_places or not problem.nearly_singular):
         return ""
@@ -109,7 +111,7 @@ def remark(
         if problem.shared_places or not problem.nearly_singular or unique(problem, found):
             return ""
         condition = np.inf  # contacts between two states may exchange forces in one of them
-    why = f"by {min(error, 1.0):.0%} of the typical force, because the solution is"
+    why = f"by {100 * min(error, 1.0):.3g} % of the typical force, because the solution is"
     why += " nearly not unique"
     if not condition < LOOSE:
         if problem.shared_places:

@@ -59,7 +59,7 @@ from contactopt.linear.stacked import Stacked
 from contactopt.problem.cones import lengths
 from contactopt.problem.interface_problem import InterfaceProblem
 from contactopt.problem.laws.law import Law
-from contactopt.problem.scaling import immovable
+from contactopt.problem.scaling import along_rest, immovable
 
 ACTS = 1e-6  # share of the largest force from which on a contact's displacement counts fully in L
 # share of a closed gap, or of a displacement that cancels, below which its remainder is rounding
@@ -230,9 +230,10 @@ def amplification(
     of P. The certificate bounds every block of M (dr, dlambda), so the largest sum of norms in a
     block row of M^-1 bounds dr. It needs the entries of Q, and no contact between two states.
     """
-    r, (k, dim) = np.asarray(reactions, dtype=float), problem.q.shape
+    k, dim = problem.q.shape
     if k == 0:
         return 0.0
+    problem, r = along_rest(problem, np.asarray(reactions, dtype=float))
     d = (problem.Q @ r.ravel()).reshape(r.shape)
     w = problem.q + (problem.V @ multipliers).reshape(r.shape)
     measure = yardsticks(problem, r, d, w)

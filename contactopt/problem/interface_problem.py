@@ -253,7 +253,7 @@ class InterfaceProblem:
         Q = np.asarray(self.Q)
         if not ill_conditioned(Q):
             return False
-        free = np.any(Q, axis=1)
+        free = row_sizes(Q) > NOISE * np.abs(Q).max()
         free[:: self.dim] = True
         size = np.sqrt(np.abs(Q.diagonal()[free]))
         return not size.all() or ill_conditioned(Q[np.ix_(free, free)] / np.outer(size, size))

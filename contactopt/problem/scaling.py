@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import block_diag
 
 from contactopt.linear.operators import (
     NOISE,
@@ -158,3 +159,25 @@ def _closing(problem: InterfaceProblem) -> float:
     if np.any(overlap > least):
         return float(np.sqrt(np.mean(overlap[overlap > least] ** 2)))
     return float(sizes[sizes > least].min()) if np.any(sizes > least) else 0.0
+
+
+def along_rest(
+    problem: InterfaceProblem, reactions: np.ndarray
+) -> tuple[InterfaceProblem, np.ndarray]:
+    """The problem with tangents turned to those along which nothing moves, if supports leave any:
+    forces along them are no part of the answer.
+    """
+    k, dim = problem.q.shape
+    if dim < 3 or not k:
+        return problem, reactions
+    own = np.asarray(problem.Q).reshape(k, dim, k, dim)[np.arange(k), :, np.arange(k)]
+    sizes, axes = np.linalg.eigh(own[:, 1:, 1:])
+    still = (sizes[:, 0] <= NOISE * sizes[:, 1]) & (np.abs(own[:, 1, 2]) > 0)
+    if not still.any():
+        return problem, reactions
+    turn = np.broadcast_to(np.eye(dim), own.shape).copy()
+    turn[still, 1:, 1:] = axes[still]
+    whole = block_diag(*turn)
+    q, r = (np.einsum("kdc,kd->kc", turn, own) for own in (problem.q, reactions))
+    Q, V = whole.T @ problem.Q @ whole, whole.T @ problem.V
+    return problem.altered(Q=Q, q=q, V=V), r

@@ -1,7 +1,8 @@
 """What the pressure owes to facets that stand for curves.
 
-Facets leave the curve between its nodes. Where the meshes of two curved surfaces do not match, the
-gap between their facets therefore differs from that between the curves, by another amount at every
+Facets leave the curve between its nodes, those of meshes of second order, which are parabolas, in
+the fourth power of their size. Where the meshes of two curved surfaces do not match, the gap
+between their facets therefore differs from that between the curves, by another amount at every
 contact. If elements of second degree have straight edges, the nodes within edges do not lie on the
 curve either. At contact i the gap of the curves is larger than that of the facets by
 
@@ -35,8 +36,10 @@ from skfem.refdom import RefLine, RefTri
 
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.reduction import Reduction
+from contactopt.defaults import EQUAL
 from contactopt.meshes.barycentric import barycentric, frames_of
-from contactopt.meshes.cells import in_triangles, is_curved, measures, outer_corners
+from contactopt.meshes.cells import in_triangles, measures, outer_corners, straight
+from contactopt.meshes.facet_surfaces import edge_middles
 from contactopt.meshes.mesh_refinement import boundary_curves
 from contactopt.problem import Solution
 
@@ -49,6 +52,7 @@ SHOWN = 0.05
 # Pressure at the corners over the angle between edges, beside rings of Lame with curved edges:
 # .13 to .21 for walls thicker than half of the radius, .5 for one of a fifth
 KINK = 0.3
+SIDES = {2: np.array([[0], [1]]), 3: np.array([[0, 1, 2], [1, 2, 0]])}  # of lines, of triangles
 INSIDE = 8  # order of the quadrature in a cell, whose points sample the chords of the other side
 
 
@@ -77,7 +81,8 @@ def chord_remarks(reduction: Reduction, solution: Solution) -> list[str]:
         found.append(
             f"the facets of '{pair.name}' stand for curves, and leave them between their nodes:"
             f" this {effect}, and the pressure changes by more than {SHOWN:.0%}; give the"
-            f" boundaries their `curve`, or meshes of second order{more}, or ask for an accuracy."
+            f" boundaries their `curve`, or finer meshes, of second order with nodes on the curve"
+            f"{more}, or ask for an accuracy."
         )
     return found
 
@@ -101,11 +106,10 @@ def _heights_and_angles(reduction: Reduction) -> tuple[np.ndarray, np.ndarray]:
             return None
         if name not in known:
             mesh = part.build_mesh(scene.elements, scene.zone)
-            exact = scene.degree == 2 and is_curved(mesh)
-            known[name] = mesh, {} if exact else boundary_curves(mesh)
+            known[name] = mesh, boundary_curves(mesh)
         mesh, curves = known[name]
         curve = curves.get(surface)
-        return None if curve is None else Way(mesh, surface, curve)
+        return None if curve is None else Way(mesh, surface, curve, scene.degree)
 
     for pair, coupling, angle in zip(scene.pairs, reduction.couplings, angles):
         if coupling.kind == "matching" and scene.degree == 1:  # contacts are nodes on the curve
@@ -133,17 +137,29 @@ def _rigid_heights(coupling: Coupling, ways: list[Way | None], gaps: list[Any]) 
 
 
 class Way:
-    """The way from the facets of a boundary to the curve that they stand for."""
+    """The way from the facets of a boundary to the curve that they stand for.
 
-    def __init__(self, mesh: Mesh, name: str, curve: Callable[[np.ndarray], np.ndarray]) -> None:
-        nodes = outer_corners(mesh, np.asarray(mesh.boundaries[name]))
+    corners  (dim, dim, f) those of the facets, quadrilaterals cut in two
+    off      (dim, 1 or 3, f) from the middles of their chords 01, 12, 20 to those of their edges
+    angle    (f,) at which straight edges of second degree meet their neighbours
+    """
+
+    def __init__(
+        self, mesh: Mesh, name: str, curve: Callable[[np.ndarray], np.ndarray], degree: int
+    ) -> None:
+        mesh = mesh if degree == 2 else straight(mesh)
+        facets = np.asarray(mesh.boundaries[name])
+        nodes = outer_corners(mesh, facets)
         edges = mesh.p[:, np.stack([nodes, np.roll(nodes, 1, axis=0)])]  # (dim, 2, c, f)
         middles = edges.mean(axis=1).reshape(len(mesh.p), -1)
         heights = np.linalg.norm(curve(middles) - middles, axis=0).reshape(nodes.shape)
         lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=0)
         angle = (8 * heights / lengths).max(axis=0)
-        nodes = in_triangles(nodes)
-        self.corners, self.angle = mesh.p[:, nodes], np.resize(angle, nodes.shape[1])
+        nodes, middles = edge_middles(mesh, facets)
+        self.corners = mesh.p[:, nodes]
+        self.off = middles - self.corners[:, SIDES[len(nodes)]].mean(axis=1)
+        bent = np.any(np.abs(self.off) > EQUAL * lengths.max(), axis=(0, 1))
+        self.angle = np.where(bent, 0.0, np.resize(angle, nodes.shape[1]))
         self.frames = frames_of(self.corners)
         self.curve, self.tree = curve, cKDTree(self.corners.mean(axis=1).T)
 
@@ -152,7 +168,10 @@ class Way:
         count = min(NEAREST, self.corners.shape[2])
         near = self.tree.query(points.T, k=count)[1].reshape(-1, count)
         share = np.clip(barycentric(self.frames, near, points)[0], 0, 1)
-        feet = np.sum(self.corners[:, :, near] * (share / share.sum(axis=0)), axis=1)
+        share = share / share.sum(axis=0)
+        both = 4 * np.prod(share[SIDES[len(share)]], axis=0)  # one in the middle of each edge
+        feet = np.sum(self.corners[:, :, near] * share, axis=1)
+        feet += np.sum(self.off[:, :, near] * both, axis=1)
         best = np.argmin(np.linalg.norm(feet - points[:, :, None], axis=0), axis=1)
         return feet[:, np.arange(len(best)), best], near[np.arange(len(best)), best]
 

@@ -126,8 +126,9 @@ def _ends_at_corners(problem: InterfaceProblem, pressure: np.ndarray) -> bool:
     """Whether pressure on a line does not fall towards its ends: there the surface ends."""
     if problem.dim == 3 or len(pressure) < 2:
         return False
-    order = np.argsort(problem.coordinates[0])
-    ends = [order[-2:]] if problem.chart.mirrored[0] else [order[-2:], order[1::-1]]
+    mirrored, places = problem.chart.mirrored[0], problem.chart.places[0]
+    order = np.argsort(np.abs(places) if mirrored else places)
+    ends = [order[-2:]] if mirrored else [order[-2:], order[1::-1]]
     return all(pressure[last] >= pressure[before] for before, last in ends)
 
 

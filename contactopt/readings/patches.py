@@ -180,16 +180,27 @@ def patches_of(problem: InterfaceProblem, inside: np.ndarray, weights: np.ndarra
         begin = _longest_run(~within)
         place = np.concatenate([place[begin:], place[:begin] + chart.period])
         order, within = np.roll(order, -begin), np.roll(within, -begin)
-    starts = np.flatnonzero(within & ~np.append(False, within[:-1]))
-    stops = np.flatnonzero(within & ~np.append(within[1:], False))
+    apart = _apart(chart, order)
+    piece = np.cumsum(np.append(False, apart))
+    starts = np.flatnonzero(within & np.append(True, ~within[:-1] | apart))
+    stops = np.flatnonzero(within & np.append(~within[1:] | apart, True))
     found = []
     for i in range(len(starts)):
         last = starts[i + 1] if i + 1 < len(starts) else len(order)
-        part = slice(stops[i - 1] + 1 if i else 0, last)
+        part = np.arange(stops[i - 1] + 1 if i else 0, last)
+        part = part[piece[part] == piece[starts[i]]]
         reaches = chart.mirrored[0] and _reaches_origin(place, place[starts[i] : stops[i] + 1])
         copies = 1 if reaches or not chart.mirrored[0] else 2
         found.append(Patch(order[part], place[part], within[part], reaches, copies, chart))
     return found
+
+
+def _apart(chart: Chart, order: np.ndarray) -> np.ndarray:
+    """(k - 1,) whether the line has a hole between contacts that follow each other in an order."""
+    if chart.cells is None:
+        return np.zeros(len(order) - 1, dtype=bool)
+    first, second = np.sort(np.argsort(order)[chart.cells], axis=0)
+    return np.asarray(~np.isin(np.arange(len(order) - 1), first[second == first + 1]))
 
 
 def _reaches_origin(place: np.ndarray, patch: np.ndarray) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from contactopt.cards import count
-from contactopt.checks import RINGS, remembered
+from contactopt.checks import remembered
 from contactopt.coupling.coupling import Coupling
 from contactopt.coupling.planes_of_symmetry import SymmetryPlane
 from contactopt.scenes.material_library import STRESSES
@@ -39,12 +39,10 @@ def doubts(
     whether a force acts on this supported boundary of the body of this number.
     """
     meshed = [part for part in scene.meshed.values() if part.given]
-    found = [note for part in meshed for note in _loaded_contacts(scene, part)]
-    found += [note for part in meshed for note in _faint_loads(scene, part)]
-    numbers = {part.name: number for number, part in enumerate(scene.parts)}
-    found += [
-        note for part in meshed for note in _pointed(part, partial(bears, numbers[part.name]))
-    ]
+    found, names = [], [part.name for part in scene.parts]
+    for part in meshed:
+        found += [*_loaded_contacts(scene, part), *_faint_loads(scene, part)]
+        found += _pointed(part, partial(bears, names.index(part.name)))
     if not any(_pushed(state, couplings) for state in states or (scene,)):
         found.append(UNPUSHED)
     found += _missing_planes(scene, planes)
@@ -93,8 +91,8 @@ def _pointed(part: Part, bears: Callable[[str], bool]) -> list[str]:
 def said_of_meshes(scene: Scene) -> list[str]:
     """What was said of the meshes of a scene when their files were read."""
     given = [part.mesh for part in scene.meshed.values() if part.given]
-    said = [text for mesh in given for text in remembered(mesh)]
-    return [text for text in said if scene.kind != "axisymmetric" or not text.endswith(RINGS)]
+    said = (own for mesh in given for own in remembered(mesh).items())
+    return [text for text, kind in said if kind != scene.kind]
 
 
 def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
@@ -105,8 +103,7 @@ def _loaded_contacts(scene: Scene, part: Part) -> list[str]:
             continue
         loaded = np.asarray(part.mesh.boundaries[load.boundary])
         for name in scene.surfaces_of(part):
-            shared = len(np.intersect1d(loaded, part.mesh.boundaries[name]))
-            if shared:
+            if shared := len(np.intersect1d(loaded, part.mesh.boundaries[name])):
                 notes.append(
                     f"the {load.what} on {load.boundary!r} of body '{part.name}' acts on"
                     f" {count(shared, 'facet')} of {name!r}, which may touch: it acts beside"
@@ -121,11 +118,9 @@ def _faint_loads(scene: Scene, part: Part) -> list[str]:
     area = float(np.linalg.norm(np.ptp(part.mesh.p, axis=1))) ** (scene.dim - 1)
     depth = _depth(scene, part.mesh.p)
     stress = 0.0
-    for load in part.loads:
-        if load.boundary:
-            largest = max(map(abs, load.values(scene.components).values()), default=0.0)
-            own = largest / (area * depth * scene.copies) if load.total else largest
-            stress = max(stress, own)
+    for load in (load for load in part.loads if load.boundary):
+        largest = max(map(abs, load.values(scene.components).values()), default=0.0)
+        stress = max(stress, largest / (area * depth * scene.copies if load.total else 1.0))
     strain = stress / part.material.E
     if not 0 < strain < 1e-9:  # no load on a solid strains it less
         return []
@@ -184,11 +179,8 @@ def _sizes(scene: Scene) -> list[str]:
     """Bodies of which one vanishes beside the other."""
     notes = []
     points = {part.name: part.mesh.p for part in scene.meshed.values() if part.given}
-    points |= {
-        part.name: part.coordinates(scene.dim)
-        for part in scene.parts
-        if isinstance(part, MatrixPart)
-    }
+    matrices = [part for part in scene.parts if isinstance(part, MatrixPart)]
+    points |= {part.name: part.coordinates(scene.dim) for part in matrices}
     size = {name: float(np.linalg.norm(np.ptp(x, axis=1))) for name, x in points.items()}
     for names in combinations(size, 2):
         small, large = sorted(names, key=lambda name: size[name])

@@ -138,16 +138,7 @@ def _of_pair(
     def make(name: str, rest: str, scene: Scene) -> Quantity:
         if read is pressure_reading and rest.isdigit():
             return Quantity(name, partial(_pressure_at, number=int(rest)), nodal=True)
-        names = [pair.name for pair in scene.pairs]
-        if not rest and len(names) > 1:
-            raise InputError(
-                f"scene '{scene.name}' has {len(names)} pairs of surfaces, each with its own"
-                f" pressure and half-widths; name the pair, as in '{name}:{names[0]}', or ask for"
-                " the energy."
-            )
-        if rest:
-            _check_pair(rest, scene)
-        number = names.index(rest) if rest else 0
+        number = _pair_number(name, rest, scene)
         return Quantity(
             name, lambda state: slopes(state, number), partial(_read_pair, read, number)
         )
@@ -172,12 +163,11 @@ def _of_scene(
 
 def _pair_force(name: str, rest: str, scene: Scene) -> Quantity:
     column, sign = (0, 1.0) if name.startswith("normal_force") else (1, -1.0)
-    if rest:
-        _check_pair(rest, scene)
+    number = _pair_number(name, rest, scene)
 
     def slopes(state: State) -> Seeds:
         weights = np.zeros(state.problem.q.shape)
-        weights[_contacts(state, rest) if rest else slice(None), column] = sign
+        weights[state.problem.pairs[number].contacts, column] = sign
         return Functional(weights)(state)
 
     return Quantity(name, slopes)
@@ -191,7 +181,7 @@ def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
             f" resultant:{scene.pairs[0].name}:{scene.components[-1]}; the contacts are"
             f" {', '.join(own.name for own in scene.pairs)}."
         )
-    _check_pair(pair, scene)
+    number = _pair_number(name, pair, scene)
     if component not in scene.components:
         raise InputError(f"there is no component {component!r}; use {', '.join(scene.components)}.")
 
@@ -201,23 +191,27 @@ def _pair_resultant(name: str, rest: str, scene: Scene) -> Quantity:
             axis = axis - plane.inward * (plane.inward @ axis)
         if scene.analysis.revolved and component == "r":
             axis = 0 * axis
-        weights, own = np.zeros(state.problem.q.shape), _contacts(state, pair)
+        weights, own = np.zeros(state.problem.q.shape), state.problem.pairs[number].contacts
         weights[own] = state.reduction.frames[own] @ axis
         return Functional(weights)(state)
 
     return Quantity(name, slopes)
 
 
-def _check_pair(name: str, scene: Scene) -> None:
-    names = [pair.name for pair in scene.pairs]
-    if name not in names:
+def _pair_number(name: str, pair: str, scene: Scene) -> int:
+    """The number of the pair that a quantity names; InputError for none of several."""
+    names = [own.name for own in scene.pairs]
+    if not pair and len(names) > 1:
         raise InputError(
-            f"there is no pair of surfaces {name!r}; the pairs are {', '.join(names)}."
+            f"scene '{scene.name}' has {len(names)} pairs of surfaces, each with its own"
+            f" forces, pressure and half-widths; name the pair, as in '{name}:{names[0]}', or ask"
+            " for the energy."
         )
-
-
-def _contacts(state: State, name: str) -> slice:
-    return next(pair.contacts for pair in state.problem.pairs if pair.name == name)
+    if pair and pair not in names:
+        raise InputError(
+            f"there is no pair of surfaces {pair!r}; the pairs are {', '.join(names)}."
+        )
+    return names.index(pair) if pair else 0
 
 
 def _motion(state: State, component: int) -> Seeds:

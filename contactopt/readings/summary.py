@@ -48,7 +48,7 @@ def summary_of(
         "message": solution.message,
         "residual": float(solution.residual),
         "outer_iterations": solution.iterations,
-        "normal_force": float(solution.reactions[:, 0].sum()),
+        "normal_force": first["normal_force"] if single else None,
         "approach": approach(reduction, solution),
         **{key: first[key] if single else None for key in WIDTHS},
         "max_pressure": largest,

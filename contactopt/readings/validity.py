@@ -124,9 +124,7 @@ def impossible(limits: dict[str, Any], couplings: Sequence[Coupling], refuse: bo
     """The sentence for a body that is squeezed to nothing, and not at the tip of a corner alone, by
     the tables of validity(). InputError with it, to `refuse`, if surfaces overlap or it is more.
     """
-    overlaps = any(
-        -own.gap.min() > SHARE * np.ptp(own.positions, axis=1).max() for own in couplings
-    )
+    overlaps = any(-c.gap.min() > SHARE * np.ptp(c.positions, axis=1).max() for c in couplings)
     most = SQUEEZED if overlaps else IMPOSSIBLE
     for name, known in limits["bodies"].items():
         if known["mean_strain"] > BOUNDS["strain"] and known["strain"] > SQUEEZED:

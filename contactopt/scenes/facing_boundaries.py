@@ -64,7 +64,7 @@ def as_toml(pairs: Iterable[Facing], mu: float | Sequence[float], length: str) -
     unit = length and f" {length}"
     return "\n".join(
         f"[[contacts]]  # gaps from {pair.gaps[0]:.3g} to {pair.gaps[1]:.3g}{unit},"
-        f" {pair.share:.0%} of the areas\n"
+        f" {100 * pair.share:.3g} % of the areas\n"
         f'upper = "{":".join(pair.sides[0])}"\nlower = "{":".join(pair.sides[1])}"\n'
         f"mu = {json.dumps(mu)}"
         for pair in pairs

@@ -144,7 +144,7 @@ class PathResult:
         """One value per state (n,). Energies are sums from the unloaded bodies on.
 
         normal_force, shear_force    that press and push the upper body on the lower, the latter
-                                     along t1 [force]
+                                     along t1 [force]; of several pairs normal_force:PAIR
         approach, shift              of the bodies, in the same directions [length]
         contact_half_width, stick_half_width [length];  contact_nodes, stick_nodes, slip_nodes
         elastic_energy, external_work, friction_work, step_work [force length]: external_work is the
@@ -220,12 +220,17 @@ class PathResult:
 def _row(problem: InterfaceProblem, state: State) -> dict[str, float]:
     r, edges = state.solution.reactions, (np.nan, np.nan)
     status = contact_status(problem, r)
-    if len(problem.pairs) == 1:
+    along, single = np.broadcast_to(np.eye(problem.dim)[1], r.shape), len(problem.pairs) == 1
+    forces = {}
+    for pair in problem.pairs:
+        own, name = pair.contacts, "" if single else f":{pair.name}"
+        forces[f"normal_force{name}"] = float(r[own, 0].sum())
+        forces[f"shear_force{name}"] = 0.0 - total(along[own], r[own])
+    if single:
         stick = stick_edge(state.scene, problem, r, state.slip)[0]
         edges = contact_edge(state.scene, problem, r), stick
     return {
-        "normal_force": float(r[:, 0].sum()),
-        "shear_force": 0.0 - total(np.broadcast_to(np.eye(problem.dim)[1], r.shape), r),
+        **forces,
         "approach": 0.0 - state.risen,
         "shift": state.shifted,
         "contact_half_width": edges[0],

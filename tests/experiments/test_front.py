@@ -163,14 +163,14 @@ def test_a_mesh_is_lucky_if_a_finer_one_is_worse(monkeypatch):
         ("sphere", "8 elements across the half-width of contact (here 32)"),
         ("press-fit", "9 elements along the surface of contact (here 14)"),
         ("hertz-half-space", "11 points across the half-width of contact (here 48)"),
-        ("rigid-punch-2d", "for 1% of the stick width"),
+        ("rigid-punch-2d", "for 1 % of the stick width"),
         ("punch-2d", ""),  # two elastic bodies with corners
         ("arch", ""),
     ],
 )
 def test_check_says_what_one_percent_takes(name, words):
     text = check_scene((scenes.make_scene(name),)).text
-    lines = [line for line in text.splitlines() if line.startswith("for 1%")]
+    lines = [line for line in text.splitlines() if line.startswith("for 1 %")]
     assert (words in lines[0]) if words else not lines
 
 

@@ -456,7 +456,7 @@ slider.addEventListener("input", () => { now.scale = Number(slider.value); times
 times();
 if (data.history) {
   const columns = Object.keys(data.history), h = data.history, moves = (name) => h[name] && Math.max(...h[name]) - Math.min(...h[name]) > 1e-6 * (Math.max(...(h.approach || [1])) - Math.min(...(h.approach || [0])));
-  const [across, upward] = moves("shift") ? ["shift", "shear_force"] : h.approach && h.normal_force ? ["approach", "normal_force"] : ["state", columns[0]];
+  const force = (name) => columns.find((own) => own.startsWith(name)), [across, upward] = moves("shift") ? ["shift", force("shear_force")] : h.approach && force("normal_force") ? ["approach", force("normal_force")] : ["state", columns[0]];
   for (const [id, chosen] of [["across", across], ["upward", upward]]) choices(id, [...(id === "across" ? [["state", "state"]] : []), ...columns.map((name) => [name, columnLabel(name)])], chosen, () => {});
   const steps = control("state");
   steps.max = data.states - 1; steps.value = now.state;
