@@ -168,7 +168,7 @@ def along_rest(
     forces along them are no part of the answer.
     """
     k, dim = problem.q.shape
-    if dim < 3 or not k:
+    if dim < 3 or not k or form(problem.Q) != "array":
         return problem, reactions
     own = np.asarray(problem.Q).reshape(k, dim, k, dim)[np.arange(k), :, np.arange(k)]
     sizes, axes = np.linalg.eigh(own[:, 1:, 1:])
