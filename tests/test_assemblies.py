@@ -153,6 +153,8 @@ def test_stack_is_in_equilibrium(tilt):
     for wrong in ({"tilt": 35.0}, {"tilt": 10.0, "mu": 0.1}, {"tilt": 20.0, "blocks": 6}):
         with pytest.raises(InputError, match="slides or falls"):
             scenes.stack(**wrong)
+    with pytest.raises(InputError, match="take mu above 0"):
+        scenes.stack(tilt=0.0, mu=0.0)
 
 
 def test_arch_is_in_equilibrium_and_symmetric():

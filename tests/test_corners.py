@@ -210,6 +210,21 @@ def test_forces_that_the_law_allows_to_exchange_are_not_unique(angles, mu, force
     assert not several or "nothing else but slip" in named
 
 
+def test_forces_that_are_not_unique_have_a_place():
+    """A tie of three contacts whose first node a support holds: two nodes tell two forces apart."""
+    parts, grid = [], np.linspace(0.0, 1.0, 2)
+    for name, low in (("lower", 0), ("upper", 1)):
+        mesh = skfem.MeshQuad.init_tensor(grid, low + grid)
+        sides = {"x-": lambda x: x[0] == 0, "y-": lambda x, y=low: x[1] == y}
+        mesh = mesh.with_boundaries(sides | {"y+": lambda x, y=low + 1: x[1] == y})
+        pressed = (Traction("y+", (0.0, -1.0)),) if low else ()
+        parts.append(Part(name, mesh, Material(100.0, 0.3), (Support("x-"),), pressed))
+    tie = (Contact("upper:y-", "lower:y+", law="tied"),)
+    result = run(Scene("held", bodies=tuple(parts), contacts=tie, degree=2), figures=())
+    (said,) = result.summary["remarks"]
+    assert "not unique" in said and said.endswith("most of all near (0, 1).")
+
+
 def test_contacts_at_one_place_that_lack_room_within_the_law_are_solved():
     """The weights of even pressures and of the law are so far apart that rounding decided."""
     force = [-0.3957788211685796, 1.1467833935816263]

@@ -129,10 +129,10 @@ def _touching(problem: InterfaceProblem, solution: Solution) -> np.ndarray:
     return np.asarray((problem.law.lowest < 0) | pressed | (u[:, 0] <= _felt(problem, u)))
 
 
-def unique(problem: InterfaceProblem, solution: Solution) -> bool:
-    """Whether the law allows no other forces of contacts that touch; where they slip, these may
-    change the slip. Forces are the nearest allowed ones to a point that lies off along an exchange
-    by chance, and to the one opposite, only if no others are.
+def loosest(problem: InterfaceProblem, solution: Solution) -> int | None:
+    """The contact whose force changes most if others take its place that the law allows, of those
+    that touch; where they slip, these may change the slip. None if the law allows no others: then
+    these forces are the nearest to a point off along an exchange by chance, and to the opposite.
     """
     contacts = np.flatnonzero(_touching(problem, solution))
     u = problem.displacements(solution.reactions, solution.multipliers)
@@ -141,16 +141,17 @@ def unique(problem: InterfaceProblem, solution: Solution) -> bool:
     own, ways, sizes = exchanges(problem, contacts, ~slipping.ravel())
     some, r = ways[:, sizes <= UNFELT], solution.reactions
     if not some.size:
-        return True
+        return None
     off, size = np.zeros(r.size), np.abs(r).max() or 1.0
     off[own] = some @ np.random.default_rng(0).normal(size=some.shape[1])
     off *= size / np.abs(off).max()
     for share in (1.0, -1.0, 1e-3, -1e-3):  # with much more force a contact may slip the other way
         found = _within(problem, solution, own, some, r + share * off.reshape(r.shape))[0]
-        moved = np.abs(found - r).max() / size
-        if natural_map_residual(problem, found, solution.multipliers) < OUTSIDE * moved**2:
-            return False
-    return True
+        moved = np.linalg.norm(found - r, axis=1) / size
+        off_law = natural_map_residual(problem, found, solution.multipliers)
+        if off_law < OUTSIDE * moved.max() ** 2:
+            return int(np.argmax(moved))
+    return None
 
 
 def _felt(problem: InterfaceProblem, u: np.ndarray) -> float:

@@ -13,9 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
+from contactopt.checks import place_words
 from contactopt.linear.operators import form
 from contactopt.problem import InterfaceProblem, Solution, Status
 from contactopt.problem.certificate import amplification
+from contactopt.problem.chart import UNNAMED
 from contactopt.problem.scaling import along_rest
 
 # a remark is due if a small problem has so large a condition, and its forces so large an error
@@ -102,21 +104,24 @@ def remark(
     # where contacts share a place, forces that are hardly felt have been exchanged
     if residual <= EXACT and (problem.shared_places or not problem.nearly_singular):
         return ""
-    from contactopt.methods.exchanged import unique  # it makes notes
+    from contactopt.methods.exchanged import loosest  # it makes notes
 
     condition = amplification(problem, reactions, multipliers)
     error = condition * max(residual, np.finfo(float).eps)
-    if condition <= WEDGED or error <= MUCH:
+    small, loose = condition <= WEDGED or error <= MUCH, None
+    if problem.shared_places and (small or not condition < LOOSE):
+        return ""
+    if problem.nearly_singular and (small or not condition < LOOSE):
         found = Solution(reactions, multipliers, Status.SOLVED, residual, 0, "")
-        if problem.shared_places or not problem.nearly_singular or unique(problem, found):
-            return ""
-        condition = np.inf  # contacts between two states may exchange forces in one of them
+        loose = loosest(problem, found)
+    if small and loose is None:
+        return ""
     why = f"by {100 * min(error, 1.0):.3g} % of the typical force, because the solution is"
     why += " nearly not unique"
-    if not condition < LOOSE:
-        if problem.shared_places:
-            return ""
+    if loose is not None or not condition < LOOSE:  # also contacts between two states
         why = "by any amount, because they are not unique, or nearly not"
+    if loose is not None and problem.pairs[0].name != UNNAMED:
+        why += f", most of all near ({place_words(problem.coordinates[:, loose])})"
     if problem.law.proportional and not problem.law.dilatant:
         why += ": see contactopt.diagnose"
     return f"The forces are certified, but they may be off {why}."

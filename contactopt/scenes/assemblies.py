@@ -206,6 +206,8 @@ def stack(
     check_positive(width=width, height=height, depth=depth, weight=weight)
     check_number("tilt", tilt, low=-90.0, high=90.0)
     angle, steepest = np.radians(tilt), min(mu, width / (blocks * height))
+    if steepest <= 0:
+        raise InputError("the stack slides without friction; take mu above 0.")
     if abs(np.tan(angle)) >= steepest:
         raise InputError(
             f"tilted by {tilt:g} degrees the stack slides or falls over; take a tilt below"
