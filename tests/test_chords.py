@@ -181,3 +181,10 @@ def test_searches_claim_what_an_overlap_leaves_open(degree, adaptive):
     assert abs(found.value / exact - 1) < found.error < 0.03
     assert found.geometry_error == pytest.approx(OVERLAP, rel=0.1)
     assert "overlap as they are drawn" in found.message
+
+
+def test_an_estimate_that_no_further_mesh_confirms_says_so():
+    aim = {"accuracy": 0.1, "quantity": "pressure", "max_unknowns": 1500, "figures": ()}
+    found = run(press_fit((8, 6), 2, order=2), **aim).estimate
+    assert found.error < 0.1 and not found.reached
+    assert found.message.startswith("the estimate is below the target, but no further mesh")

@@ -240,6 +240,10 @@ class _Loop:
         reached = self.reached and error is not None and error <= self.accuracy
         if self.reached and not reached:
             message = "the geometry keeps the target out of reach"
+        elif error is not None and error <= self.accuracy and not reached:
+            message = (
+                f"the estimate is below the target, but no further mesh confirms it: {message}"
+            )
         message = f"{message}; {sentence}" if sentence else message
         seconds = dict(self.solved.solution.seconds)
         earlier = max(last.seconds - sum(seconds.values()), 0.0)
