@@ -287,7 +287,7 @@ def test_a_quantity_of_one_of_several_pairs():
     for wrong, message in (
         (
             "pressure",
-            "2 pairs of surfaces, each with its own forces, pressure and half-widths; name the pair",
+            "2 pairs of surfaces, each with its own forces, pressure and half-widths; name",
         ),
         ("pressure:a-b", "there is no pair of surfaces 'a-b'; the pairs are .*, block-floor"),
         ("energy:block-floor", "the energy belongs to the whole scene"),
