@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from contactopt.benchmark.ranking import (
     NOISE,
@@ -122,6 +123,24 @@ def test_two_reruns_agree_as_kendall_says():
     one, other = halves
     swapped = other.replace({"method": {"fast": "fails", "fails": "fast"}})
     assert agreement(points(one), points(swapped), 1e-6) == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_ties_count_as_in_tau_b_and_ranks_as_those_of_scipy(seed):
+    """Times of which several are equal, beside kendalltau and rankdata of SciPy."""
+    rng = np.random.default_rng(seed)
+    drawn = rng.integers(1, 5, size=(2, 8))
+    runs = [
+        [row for n, t in enumerate(own) for row in rows(f"m{n}", [(1e-6, 1e-7, 0.01 * t)])]
+        for own in drawn
+    ]
+    found = [points(pd.DataFrame(own)) for own in runs]
+    expected = stats.kendalltau(*drawn, variant="b").statistic
+    assert agreement(*found, 1e-6) == pytest.approx(expected, abs=1e-12)
+    one = ranking(found[0], 1e-6).set_index("method").sort_index()
+    own = stats.rankdata(drawn[0], method="min")
+    for column in ("rank", "best", "worst"):  # one problem: each sample is the same
+        assert one[column].tolist() == own.tolist()
 
 
 def test_a_busy_machine_ranks_nobody_and_says_so():
