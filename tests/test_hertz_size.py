@@ -48,16 +48,21 @@ def test_scenes_without_curves_or_with_unknown_forces_are_left_alone():
         assert not hertz(scene, check.posed, check.free)
 
 
-def roller(turn: float) -> Scene:
-    """Part of a cylinder of radius 10 along 8 mm on a block that is longer, turned about z."""
+def roller(turn: float, half: bool = False) -> Scene:
+    """Part of a cylinder of radius 10 along 8 mm on a block that is longer, turned about z; or the
+    half of both beyond the plane of symmetry along the cylinder.
+    """
     c, s = np.cos(turn), np.sin(turn)
 
     def body(name, x, y, z, bent, faces, **given):
-        mesh = skfem.MeshHex.init_tensor(x, y, z)
+        mesh = skfem.MeshHex.init_tensor(x[x >= 0] if half else x, y, z)
         names = {
             face: mesh.facets_satisfying(lambda p, at=at: np.isclose(p[2], at))
             for face, at in faces.items()
         }
+        if half:
+            names["cut"] = mesh.facets_satisfying(lambda p: p[0] == 0)
+            given["supports"] = (*given.get("supports", ()), Support("cut", {"x": 0.0}))
         p = mesh.p.copy()
         p[2] += bent * (1 - p[2] / 2) * p[0] ** 2 / 20
         p[:2] = np.array([[c, -s], [s, c]]) @ p[:2]
@@ -70,13 +75,14 @@ def roller(turn: float) -> Scene:
     x, y, z = np.linspace(-3, 3, 7), np.linspace(-1, 9, 4), np.linspace(-2, 0, 4)
     lower = body("lower", x, y, z, 0.0, {"contact": 0.0, "base": -2.0}, supports=(Support("base"),))
     return Scene("roller", kind="solid", bodies=(upper, lower),
-                 contacts=(Contact("upper:contact", "lower:contact", 0.1),))  # fmt: skip
+                 contacts=(Contact("upper:contact", "lower:contact", 0.1),),
+                 copies=2 if half else 1)  # fmt: skip
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.4])
-def test_a_roller_touches_along_its_length(turn):
+@pytest.mark.parametrize("turn, half", [(0.0, False), (0.4, False), (0.0, True)])
+def test_a_roller_touches_along_its_length(turn, half):
     """The ellipse of so slight a curvature was wider than the roller, or there was none."""
-    scene = roller(turn)
+    scene = roller(turn, half)
     check = check_scene((scene,))
     (own,) = hertz(scene, check.posed, check.free).values()
     assert own.widths[0] == pytest.approx(4.0)
