@@ -178,15 +178,13 @@ def test_the_least_friction_obeys_the_law(law, share):
     assert np.allclose(exchanged.least_friction(problem, given, 1e-8).reactions, exact, atol=1e-7)
 
 
-def meeting(angles, mu, force, rigid=False, named=True) -> InterfaceProblem:
+def meeting(angles, mu, force, named=True) -> InterfaceProblem:
     """A node under a force in several contacts, whose normals have these angles with x."""
     frames = [[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in angles]
     B, k = np.concatenate(frames), len(angles)
     chart = InterfaceProblem(np.eye(2), [[-1.0, 0.0]], 0.3).chart
     pairs = [Pair(str(i), i, i + 1, chart) for i in range(k)]
     given = {"pairs": tuple(pairs), "coordinates": np.zeros((2, k))} if named else {}
-    if rigid:
-        return InterfaceProblem(0 * B @ B.T, np.zeros((k, 2)), mu, V=B, s=-np.array(force), **given)
     return InterfaceProblem(B @ B.T, -(B @ force).reshape(k, 2), mu, **given)
 
 

@@ -13,6 +13,8 @@ from contactopt.methods.enumeration import all_solutions
 from contactopt.methods.tresca_iteration import Tresca
 from contactopt.problem import Solution, amplification
 from contactopt.problem.certificate import yardsticks
+from contactopt.problem.laws import Orthotropic
+from contactopt.problem.scaling import along_rest
 
 
 def relative_error(problem: InterfaceProblem, answer: Solution, exact: Solution) -> float:
@@ -85,6 +87,9 @@ def test_tangents_at_rest_leave_the_other_forces_unique(angle):
     answer = solve(problem, tol=1e-12)
     assert amplification(problem, answer.reactions, answer.multipliers) < 10
     assert not any("not unique" in said for said in answer.notes)
+    if angle == 0.7:  # the law tells the tangents apart, which so must stay
+        grooved = problem.altered(law=Orthotropic(np.full(2, 0.5), np.full(2, 0.3), np.zeros(2)))
+        assert along_rest(grooved, answer.reactions)[0] is grooved
     twice = InterfaceProblem(np.kron(np.ones((2, 2)), Q[:3, :3]), np.stack([q[:3]] * 2), 0.5)
     r = np.array([[0.5, 0.0, -0.1], [0.5, 0.0, -0.1]])
     assert amplification(twice, r, np.zeros(0)) > 1e12

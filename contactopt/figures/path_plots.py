@@ -67,7 +67,7 @@ def _loop(path: PathResult) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
     sheared = np.ptp(history["shift"]) > 1e-6 * np.ptp(history["approach"])
     keys = ("shift", "shear_force") if sheared else ("approach", "normal_force")
     own = next(name for name in history if name.startswith(keys[1]))  # of several pairs the first
-    labels = f"{keys[0]} [{length}]", f"{own.replace('_', ' ')} [{force}]"
+    labels = f"{keys[0]} [{length}]", f"{own.replace('_', ' ').replace(':', ' of ')} [{force}]"
     return history[keys[0]], history[own], labels
 
 

@@ -31,8 +31,8 @@ FEW = 600
 INSIDE = 1e-6
 SEEN = 1e-6  # size of the friction of an exchange of size one that has some
 EMPTY = np.zeros(0, dtype=int)
-# residual of other forces over the square of their distance: that of forces outside of a cone is
-# near one, that of allowed ones was at most 1e-7
+# Residual of other forces over the square of their distance: off a cone, which bends away from its
+# tangents, it is of the order of one; of allowed forces it is what is left of the search for them.
 OUTSIDE = 1e-4
 UNFELT = 1e-10  # relative size of displacements by forces that no body feels
 # by forces that are hardly felt, and the certificate up to which others may take their place

@@ -109,19 +109,20 @@ def remark(
     condition = amplification(problem, reactions, multipliers)
     error = condition * max(residual, np.finfo(float).eps)
     small, loose = condition <= WEDGED or error <= MUCH, None
-    if problem.shared_places and (small or not condition < LOOSE):
-        return ""
-    if problem.nearly_singular and (small or not condition < LOOSE):
-        found = Solution(reactions, multipliers, Status.SOLVED, residual, 0, "")
-        loose = loosest(problem, found)
-    if small and loose is None:
-        return ""
-    why = f"by {100 * min(error, 1.0):.3g} % of the typical force, because the solution is"
-    why += " nearly not unique"
-    if loose is not None or not condition < LOOSE:  # also contacts between two states
+    if small or not condition < LOOSE:
+        if problem.shared_places:
+            return ""
+        if problem.nearly_singular:  # contacts between two states may exchange forces in one
+            found = Solution(reactions, multipliers, Status.SOLVED, residual, 0, "")
+            loose = loosest(problem, found)
+        if small and loose is None:
+            return ""
         why = "by any amount, because they are not unique, or nearly not"
-    if loose is not None and problem.pairs[0].name != UNNAMED:
-        why += f", most of all near ({place_words(problem.coordinates[:, loose])})"
+        if loose is not None and problem.pairs[0].name != UNNAMED:
+            why += f", most of all near ({place_words(problem.coordinates[:, loose])})"
+    else:
+        why = f"by {100 * min(error, 1.0):.3g} % of the typical force, because the solution is"
+        why += " nearly not unique"
     if problem.law.proportional and not problem.law.dilatant:
         why += ": see contactopt.diagnose"
     return f"The forces are certified, but they may be off {why}."

@@ -164,15 +164,18 @@ def _closing(problem: InterfaceProblem) -> float:
 def along_rest(
     problem: InterfaceProblem, reactions: np.ndarray
 ) -> tuple[InterfaceProblem, np.ndarray]:
-    """The problem with tangents turned to those along which nothing moves, if supports leave any:
-    forces along them are no part of the answer.
+    """The problem and its forces (k, dim) with tangents turned to those along which nothing moves,
+    where supports leave any: forces along them are no part of the answer. As it is if Q is no
+    symmetric array, or if the law tells one tangent from the other.
     """
     k, dim = problem.q.shape
-    if dim < 3 or not k or form(problem.Q) != "array":
+    alike = dim == 3 and k and problem.law.stretch(dim) is None
+    if not alike or form(problem.Q) != "array" or not problem.symmetric:
         return problem, reactions
     own = np.asarray(problem.Q).reshape(k, dim, k, dim)[np.arange(k), :, np.arange(k)]
     sizes, axes = np.linalg.eigh(own[:, 1:, 1:])
-    still = (sizes[:, 0] <= NOISE * sizes[:, 1]) & (np.abs(own[:, 1, 2]) > 0)
+    least = NOISE * sizes[:, 1]
+    still = (sizes[:, 0] <= least) & (np.abs(own[:, 1, 2]) > least)
     if not still.any():
         return problem, reactions
     turn = np.broadcast_to(np.eye(dim), own.shape).copy()

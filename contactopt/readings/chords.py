@@ -1,10 +1,11 @@
 """What the pressure owes to facets that stand for curves.
 
-Facets leave the curve between its nodes, those of meshes of second order, which are parabolas, in
-the fourth power of their size. Where the meshes of two curved surfaces do not match, the gap
-between their facets therefore differs from that between the curves, by another amount at every
-contact. If elements of second degree have straight edges, the nodes within edges do not lie on the
-curve either. At contact i the gap of the curves is larger than that of the facets by
+Facets leave the curve between its nodes. Those of meshes of second order are parabolas, whose
+distance from it falls with the fourth power of their size. Where the meshes of two curved surfaces
+do not match, the gap between their facets therefore differs from that between the curves, by
+another amount at every contact. If elements of second degree have straight edges, the nodes within
+edges do not lie on the curve either. At contact i the gap of the curves is larger than that of the
+facets by
 
     d_i = int psi_i (c_upper - c_lower) . n / int phi_i,
 
@@ -81,8 +82,8 @@ def chord_remarks(reduction: Reduction, solution: Solution) -> list[str]:
         found.append(
             f"the facets of '{pair.name}' stand for curves, and leave them between their nodes:"
             f" this {effect}, and the pressure changes by more than {SHOWN:.0%}; give the"
-            f" boundaries their `curve`, or finer meshes, of second order with nodes on the curve"
-            f"{more}, or ask for an accuracy."
+            f" boundaries their `curve`, or finer meshes of second order{more}, or ask for an"
+            " accuracy."
         )
     return found
 
